@@ -99,11 +99,11 @@ def _split(line: str, mark: str) -> list[str]:
 
 
 def _names_and_units(titles: Sequence[str]) -> list[tuple[str, str]]:
-    """Return names and units: "x [mm]" has a unit, "q[0]" beside "q[1]" an index."""
+    """Return names and units: "x [mm]" has a unit, "q[0]" beside "q[1]", or "thrust[2]", an index."""
     parts = [title[:-1].partition("[") if title.endswith("]") else (title, "", "") for title in titles]
     names = [name for name, _, _ in parts]
     return [
-        (title, "") if unit.isdigit() and names.count(name) > 1 else (name.strip(), unit.strip())
+        (title, "") if unit.isdigit() and (names.count(name) > 1 or unit != "1") else (name.strip(), unit.strip())
         for title, (name, _, unit) in zip(titles, parts, strict=True)
     ]
 

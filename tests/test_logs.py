@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 from towline import load
 from towline.base.errors import InputError
 from towline.estimation.logs import read_log, read_measurements, recordings
+from towline.estimation.logs.mapping import fields_of
 from towline.estimation.logs.names import role
+from towline.estimation.logs.tables import from_csv
 from towline.models import Dynamics, points
 
 from .recorded import motion, quaternions, recorded, write_json_mcap, write_ros1_bag, write_ros2_bag, write_ros2_mcap
@@ -110,6 +112,7 @@ NAMES = {
         "/cable_lengths/data.3",
         "tether_4_length",
         "rho_1",
+        *("motor1_pos", "winch_position_2", "Axis1.ActPos", "angle_1", "payout_1", "w1_length"),
     ],
     "tensions": [
         "tension0",
@@ -122,14 +125,16 @@ NAMES = {
         "/loadcell_1/wrench.force.z",
         "/winch_3/ft/wrench.force.z",
         "/force_sensor_2/data/force/z",
+        *("lc1_kg", "lc2_fz"),
     ],
     "position": [
         *("x", "pos_y", "position.z", "/mocap/pose.position.x", "field.pose.position.y", "px", "translation.z"),
         *("x_gt", "actual_y", "ground_truth_z", "x_mocap", "tcp_x", "Global Angle:platform/TX"),
+        *("position[2]", "PN", "drone1.pos_d", "east", "mocapX", "LocalX"),
     ],
     "quaternion": ["qx", "q_w", "quat_z", "/mocap/pose.orientation.w", "rotation.x", "orientation_y"],
-    "angles": ["roll", "Yaw", "/imu/pitch", "roll_gt", "pitch (degrees)", "ry_deg"],
-    "thrusts": ["thrust_1", "/uav2/thrust_estimate/data", "quad1.thrust_measured"],
+    "angles": ["roll", "Yaw", "/imu/pitch", "roll_gt", "pitch (degrees)", "ry_deg", "EulerX", "rpy[2]", "imu_roll"],
+    "thrusts": ["thrust_1", "/uav2/thrust_estimate/data", "quad1.thrust_measured", "thrust_cmd", "ThO"],
     "thrust_vectors": ["thrust_x", "uav1/thrust.vector.y", "quad_2_thrust_z"],
     "time": [
         "t",
@@ -154,8 +159,26 @@ NAMES = {
         "temperature_1",
         "angular_velocity.z",
         "factual_x",
+        *("Axis1.SetPos", "lc_status", "motor_current_1"),
     ],
 }
+
+
+def table(names):
+    return from_csv(f"{','.join(names)}\n{','.join('1' for _ in names)}\n".encode(), "a.csv")
+
+
+def test_axes_with_other_names():
+    """North, east, down and position[0] to [2] are x, y, z; rx, ry, rz without rw are angles; eight are no position."""
+    for names, turned in (
+        (["PN", "PE", "PD"], ["Roll", "Pitch", "Yaw"]),
+        (["position[0]", "position[1]", "position[2]"], ["rx", "ry", "rz"]),
+        (["east", "north", "up"], ["euler_x", "euler_y", "euler_z"]),
+    ):
+        found = fields_of([table([*names, *turned])])
+        assert [one.name for one in found.position] == names
+        assert [one.name for one in found.orientation] == turned
+    assert not fields_of([table(["l0", "u", *(f"position[{i}]" for i in range(8))])]).position
 
 
 @pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind, names in NAMES.items() for name in names])

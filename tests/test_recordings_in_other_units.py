@@ -167,7 +167,8 @@ def test_two_drones_in_north_east_down(ned, tmp_path):
     if ned:
         (note, *_) = [note for note in told["notes"] if "are not used" in note]
         # The file's load is 50 g lighter than the real one.
-        assert float(note.split("[")[1].split(" N]")[0]) == pytest.approx(FULL, rel=0.06)
+        assert float(note.split("cf1_thrust [")[1].split(" N]")[0]) == pytest.approx(FULL, rel=0.06)
+        assert note.count("cf2_thrust [") == 1
         (tmp_path / "map.yaml").write_text(f"thrusts: cf*_thrust [{FULL} N]\n")
     fields = ["--fields", "map.yaml"] if ned else []
     options[1] = "offsets,mass"
@@ -366,3 +367,24 @@ def test_decimal_commas_and_a_map_for_one_of_two_files(tmp_path):
     (tmp_path / "map.yaml").write_text("lengths: Seil *\n")
     (note,) = read_log(tmp_path / "winden.csv", fields=tmp_path / "map.yaml").notes
     assert note.startswith("Uhr rises as a time does")
+
+
+def test_attitudes_of_drones_in_degrees(tmp_path):
+    """As ArduPilot writes them, without a unit: north, east, down, and a throttle that the suggested map gives one."""
+    t, x, drones = user.team(12)
+    ned, frd = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]]), np.diag([1, -1, -1.0])
+    names, columns = ["TimeUS"], [np.round(1e6 * t)]
+    for i, (p, R, thrust, _) in enumerate(drones):
+        names += [f"cf{i + 1}.{name}" for name in ("PN", "PE", "PD", "Roll", "Pitch", "Yaw", "ThO")]
+        columns += [*(ned @ p.T), *Rotation.from_matrix(ned @ R @ frd).as_euler("xyz", degrees=True).T, thrust / FULL]
+    names, columns = [*names, "load.PN", "load.PE", "load.PD"], [*columns, *(ned @ x.T)]
+    user.write(tmp_path / "log.csv", names, np.column_stack(columns), form="%.12g")
+    robot = user.team_robot(tmp_path)
+    notes = read_log(tmp_path / "log.csv", robot=robot).notes
+    assert sum("read in degrees" in note for note in notes) == 2
+    (suggested, _) = (note.split("'")[1] for note in notes if "are not used" in note)
+    (tmp_path / "map.yaml").write_text(suggested.replace(suggested.split("[")[2].split(" N")[0], str(FULL)))
+    read = read_log(tmp_path / "log.csv", robot=robot, fields=tmp_path / "map.yaml")
+    pull = np.linalg.norm(0.4 * (np.gradient(np.gradient(x, t, axis=0), t, axis=0) + user.GRAVITY), axis=1)
+    both = sum(tension[:, None] * q for tension, (*_, q) in zip(read.measurements.tensions.T, drones, strict=True))
+    assert np.median(np.abs(np.linalg.norm(both, axis=1) / pull - 1)) < 0.01

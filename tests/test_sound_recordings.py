@@ -86,7 +86,7 @@ def test_the_suggested_unit_of_thrusts(factors, kept, unit, tmp_path):
     user.write(tmp_path / "log.csv", [names[i] for i in used], values[:, used], form="%.12g")
     notes = [note for note in read_log(tmp_path / "log.csv", robot=robot).notes if "are not used" in note]
     assert len(notes) == kept
-    suggested = [float(note.split("thrust_* [")[1].split(" N]")[0]) for note in notes if "thrust_*" in note]
+    suggested = [float(note.split('"cf1_thrust [')[1].split(" N]")[0]) for note in notes if "thrusts: [" in note]
     assert len(suggested) == sum(factor != 0 for factor in factors[:kept])
     np.testing.assert_allclose(suggested, unit, rtol=0.1)
 

@@ -16,6 +16,7 @@ from .streams import Reader, at_times
 from .thrust_gains import notes as notes_of_gains
 from .thrust_gains import thrust_gains
 
+MOST_TILT = 1.1 * np.pi
 LEAST_THRUST, MOST_THRUST = 0.6, 3.0  # times the weight, of thrusts in newtons
 
 
@@ -30,8 +31,11 @@ def filled(times: np.ndarray | None, samples: Samples, field: Field) -> np.ndarr
     return np.column_stack([np.interp(times, times[good], column[good]) for column in values.T])
 
 
-def _plausible(robot: Robot, thrusts: np.ndarray, notes: list[str]) -> np.ndarray:
-    """Return thrusts (N, c) [N], nan of carriers that they could not hold up, or that fly without any load."""
+def _plausible(robot: Robot, thrusts: np.ndarray, names: Sequence[str], notes: list[str]) -> np.ndarray:
+    """Return thrusts (N, c) [N], nan of carriers that they could not hold up, or that fly without any load.
+
+    `names` are those of their fields, for a map.
+    """
     result, gravity = thrusts.copy(), float(np.linalg.norm(robot.gravity))
     # In hover all thrusts together hold all weights, which gives the unit of those from 0 to 1.
     flying = [i for i, carrier in enumerate(robot.carriers) if carrier.actuators and np.isfinite(thrusts[:, i]).any()]
@@ -46,7 +50,8 @@ def _plausible(robot: Robot, thrusts: np.ndarray, notes: list[str]) -> np.ndarra
             result[:, index] = np.nan
             hint = ""
             if index in driven and together:
-                hint = f"; a map may state their unit, as in 'thrusts: thrust_* [{weights / together:.3g} N]'"
+                each = ", ".join(f'"{name} [{weights / together:.3g} N]"' for name in names)
+                hint = f"; a map may state their unit, as in 'thrusts: [{each}]'"
             notes.append(
                 f"thrusts of {carrier.name} are not used: they are {quantity(usual, 'N', 3)} (median) for a weight of "
                 f"{quantity(own, 'N', 3)}{hint}"
@@ -96,6 +101,7 @@ def carriers_at(
     """
     poses = np.tile(robot.carrier_home, (count, 1, 1))
     thrusts, vectors = np.full(poses.shape[:2], np.nan), []
+    names: dict[str, None] = {}
     for index, carrier in enumerate(robot.carriers):
         if not carrier.free_coordinates(robot.drive):
             continue
@@ -107,33 +113,44 @@ def carriers_at(
         if found.position:
             poses[:, index, :3] = at_times(times, reader.stream(found.position), found.position[0]).values
         if found.orientation:
-            poses[:, index, 3:] = angles_at(times, reader, found)
+            poses[:, index, 3:] = angles_at(times, reader, found, notes)
         elif not carrier.keeps_attitude:
             poses[:, index, 3:] = np.nan
         if found.thrusts:
             values = filled(times, reader.stream(found.thrusts), found.thrusts[0])
+            names |= dict.fromkeys(one.full for one in found.thrusts)
             if len(found.thrusts) == 3:
                 vectors.append(carrier.name)
             thrusts[:, index] = values[:, 0] if values.shape[1] == 1 else np.linalg.norm(values, axis=1)
     if vectors:
-        names = ", ".join(vectors)
-        notes.append(f"thrusts of {names} are vectors: their sizes are used, along the z axes of the bodies")
+        notes.append(
+            f"thrusts of {', '.join(vectors)} are vectors: their sizes are used, along the z axes of the bodies"
+        )
     flying = [i for i, carrier in enumerate(robot.carriers) if carrier.actuators]
     if flying and ((given and given.thrusts) or not np.isfinite(thrusts).any()):
-        names = [carrier.name for carrier in robot.carriers]
-        found = command_fields(recordings, given, robot.m, names)
+        found = command_fields(recordings, given, robot.m, [carrier.name for carrier in robot.carriers])
+        names = dict.fromkeys(one.full for one in found.thrusts)
         if found.thrusts and len(found.thrusts) != len(flying):
             wanted = f"{len(flying)} fields, one for each carrier that flies"
             raise InputError(f"thrusts must be {wanted}, got {len(found.thrusts)}")
         if found.thrusts:
             thrusts[:, flying] = filled(times, Reader(found).stream(found.thrusts), found.thrusts[0])
-    return poses, _plausible(robot, thrusts, notes)
+    return poses, _plausible(robot, thrusts, list(names), notes)
 
 
-def angles_at(times: np.ndarray | None, reader: Reader, found: Fields) -> np.ndarray:
-    """Return the orientation of a carrier at some times as angles, (N, 3) [rad]; nan: not recorded."""
+def angles_at(times: np.ndarray | None, reader: Reader, found: Fields, notes: list[str] | None = None) -> np.ndarray:
+    """Return the orientation of a carrier at some times as angles, (N, 3) [rad]; nan: not recorded.
+
+    Carriers do not turn over: roll and pitch that go beyond pi are in degrees, which is noted.
+    """
     samples = reader.stream(found.orientation)
     if samples.values.shape[1] == 3:
+        if np.nanmax(np.abs(samples.values[:, :2]), initial=0.0) > MOST_TILT:
+            samples = Samples(samples.times, np.radians(samples.values))
+            if notes is not None:
+                notes.append(
+                    f"{found.orientation[0].full} and angles like it are read in degrees, since they exceed pi"
+                )
         samples = Samples(samples.times, np.unwrap(samples.values, axis=0))
         return at_times(times, samples, found.orientation[0]).values
     from scipy.spatial.transform import Rotation

@@ -15,11 +15,12 @@ from ...base.inputs import file_path
 from ...models.parsing import read_yaml
 from ...models.part import COORDINATES, Part
 from ...models.robot import Robot
-from .names import UNITS, Role, measured_name, role, unit_of
+from .names import ANGLE_OF, TURNED, UNITS, Role, measured_name, role, unit_of
 from .recording import Recording, Topic, plain
 
 AXES = {"position": ("x", "y", "z"), "quaternion": ("x", "y", "z", "w"), "angles": ("roll", "pitch", "yaw")}
 AXES["thrust_vectors"] = AXES["position"]
+OTHER_AXES = ("012", "ned", "enu")  # of position[0] and PN, for x, y, z
 OF_DIRECTION = ("x", "y", "z", "swivel", "azimuth", "elevation")
 TITLE = re.compile(r"(.+?)(?:\s+\[([^\]]*)\])?")
 OF_STRUCTURES = ("x", "y", "z", "w", "roll", "pitch", "yaw")
@@ -232,22 +233,33 @@ def _usual(
         key = (id(recording), topic.name if what == "time" else "", found.role, found.group)
         unit = topic.fields[name] or found.unit
         groups.setdefault(key, []).append((found, Field(recording, topic, name, unit)))
-    for key, members in groups.items():
+    for key, members in list(groups.items()):
+        names = {found.which for found, _ in members}
+        if key[2] in AXES and not names & set(AXES[key[2]]) and not any(names == set(axes) for axes in OTHER_AXES):
+            del groups[key]  # position[0] to position[7]
+            continue
+        if key[2] == "quaternion" and re.search("r#$|rot", key[3]) and "w" not in names:
+            del groups[key]  # rx, ry, rz or rot_x, rot_y, rot_z alone are angles
+            key = (*key[:2], "angles", key[3])
+            members = [(found._replace(which=ANGLE_OF[found.which]), one) for found, one in members]
         stated = any(one.unit for _, one in members)
-        groups[key] = [(found, _in_units(one, found.role, stated)) for found, one in members]
+        groups[key] = [(found, _in_units(one, key[2], stated)) for found, one in members]
     if what == "time":
         return tuple(members[0][1] for members in groups.values())
     complete: list[tuple[Field, ...]] = []
     for (_, _, kind, _), members in groups.items():
         by_name = {found.which: one for found, one in members}
         if kind in AXES:
+            if (others := next((one for one in OTHER_AXES if set(by_name) == set(one)), None)) is not None:
+                by_name = {axis: by_name[other] for axis, other in zip(AXES[kind], others, strict=True)}
             axes = tuple(axis for axis in AXES[kind] if axis in free.split())
             if kind == "angles" and len(axes) == len(by_name) == 1:  # a planar robot has one angle, whatever its name
                 by_name = dict(zip(axes, by_name.values(), strict=True))
             axes = axes if set(axes) == set(by_name) else AXES[kind]
             missing = set(axes) - set(by_name)
             greek = GREEK.search(members[0][1].name) is not None  # which have other meanings too
-            if missing and kind != "thrust_vectors" and not greek and not members[0][1].topic.name:
+            named = kind != "thrust_vectors" and not greek and set(by_name) <= set(AXES[kind])
+            if missing and named and not members[0][1].topic.name:
                 names = ", ".join(one.full for _, one in members)
                 wanted = ", ".join(_like(members[0], axis) for axis in axes)
                 raise InputError(f"must have all columns {wanted} or none of them, got {names}")
@@ -263,7 +275,8 @@ def _usual(
             order = sorted(by_name, key=lambda which: int(which or 0))
             first, count = int(order[0] or 0), len(order)
             wanted = [str(i) for i in range(min(first, 1), min(first, 1) + count)]
-            if order not in (wanted, [""]) and not members[0][1].topic.name:
+            lone = count == 1 and what == "thrusts"  # thrust_body[2], of PX4
+            if order not in (wanted, [""]) and not (lone or members[0][1].topic.name):
                 mine = [one.full for _, one in members]
                 others = [one.full for its in groups.values() if its is not members for _, one in its]
                 if len(mine) < len(others):
@@ -277,8 +290,10 @@ def _usual(
         complete = [one for one in complete if len(one) == m] or complete
     if len(complete) > 1 and what == "lengths":  # winch_1 rather than pulley_1_joint
         complete = [one for one in complete if not BEHIND_NUMBER.search(one[0].full)] or complete
-    if len(complete) > 1 and what in ("lengths", "tensions", "directions"):
+    if len(complete) > 1 and what in ("lengths", "tensions", "directions", "thrusts", "thrust_vectors"):
         complete = [one for one in complete if measured_name(one[0].full) is None] or complete
+    if len(complete) > 1 and what == "lengths":  # l1 rather than angle_1
+        complete = [one for one in complete if not re.search(TURNED, one[0].full.lower())] or complete
     if len(complete) > 1 and what == "position":  # messages of poses rather than transforms and scenes
         complete = [one for one in complete if "Pose" in one[0].topic.kind] or complete
     if len(complete) > 1 and what == "position":  # of a body that has an orientation, rather than of its markers

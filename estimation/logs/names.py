@@ -28,62 +28,79 @@ UNITS = {
 _BEFORE = r"(?:.*[./_ ])?"
 _AFTER = r"(?:[./_ ](?:length|len|position|pos|data|value))*"
 _NUMBER = r"[./_ ]?[\[(]?(\d+)[\])]?"
-_OF = r"(?:(?:cable|rope|wire|winch|tether|tendon)[_ ]?)?"
-_BODY = r"(?:payload|load|platform|plat|end[_ ]?effector|ee|tcp|mp|mocap|vicon|optitrack"
-_BODY += r"|(?:rigid[_ ]?)?body[_ ]?\d*|rb\d*|object|pose|state(?:_?estimate)?)"
-_DIRECTION = r"(?:dir(?:ection)?s?|(?:unit[_ ]?)?vec(?:tor)?s?)"
+_OF = r"(?:(?:cable|rope|wire|winch|tether|tendon|line|string)[_ ]?)?"
+_BODY = r"(?:payload|load|platform|plat|(?:end[_ ]?)?effector|ee|tcp|mp|mocap|vicon|opti(?:track)?|marker|prism"
+_BODY += r"|laser|cart|(?:rigid[_ ]?)?body[_ ]?\d*|rb\d*|object|pose|state(?:_?estimate)?"
+_BODY += r"|(?:vehicle[_ ]?)?local(?:[_ ]?position)?)"
+_DIRECTION = r"(?:dir(?:ection)?s?|(?:unit[_ ]?)?vec(?:tor)?s?|unit)"
 _CABLE = r"(?:cable|rope|wire|tether|winch|c)s?[_ ./]?\[?(?:cable )?(\d+)\]?"
-_WINCH = r"(?:cable|rope|wire|tether|winch(?:e?s)?|motor|axis|drive|joint|actuator|[cm])s?[./_ ]?(\d+)[./_ ]"
-_SENSOR = r"(?:load[_ ]?cell|cable|rope|wire|winch|tension|force[_ ]?sensor|ft)"
+_DRUM = r"(?:cable|rope|wire|tether|winch(?:e?s)?|motor|axis|ax|drive|drum|encoder|enc|joint|actuator|[cmw])s?"
+_WINCH = rf"{_DRUM}[./_ ]?(\d+)[./_ ]"
+TURNED = r"(?:act(?:ual)?)?(?:positions?|pos|angles?|theta|counts?|ticks?)"  # what the sensor of a drum's motor reads
+_SENSOR = r"(?:load[_ ]?cell|lc|cable|rope|wire|winch|tension|force[_ ]?sensor|ft)"
 _NO_LENGTH = re.compile(r"tension|force|effort|speed|veloc|vel_|accel|current|torque|thrust|temp|status|error")
-_SENSED = r"(?:[./_ ](?:data|value|estimated?|est|measured?|total))*"
+_SENSED = r"(?:[./_ ](?:data|value|estimated?|est|measured?|total|norm(?:ali[sz]ed)?|cmd|command|setpoint|body))*"
 _VECTOR = r"(?:[./_ ](?:vector|data|value))*[./_ ]?\[?([xyz])\]?"
 # The groups are what tells the fields of a role apart: the cable's number or name, the axis, or both.
 PATTERNS = {
     "lengths": (
-        rf"{_BEFORE}{_OF}(?:l|rho|len|lengths?|cables?|ropes?|wires?|tethers?|tendons?|winch(?:es)?|drums?|encoders?|enc)"
-        rf"{_NUMBER}{_AFTER}",
+        rf"{_BEFORE}{_OF}(?:l|ell|rho|len|lengths?|cables?|ropes?|wires?|tethers?|tendons?|lines?|strings?|winch(?:es)?"
+        rf"|drums?|reels?|spools?|payout|encoders?|enc){_NUMBER}{_AFTER}",
         rf"{_BEFORE}{_OF}lengths?[./_ ](?:data|values?|position)[\[.](\d+)\]?",
         rf"{_BEFORE}{_WINCH}(?:[a-z]+[./_ ])?(?:cable|rope|wire)?[_ ]?(?:len|lengths?)(?:[./_ ](?:data|value))*",
         r"field\.position(\d+)",  # of a JointState that `rostopic echo -p` wrote
         r".*/position\[[^\]]*?(\d+)(?:[_ ][^\]0-9]+)?\]",  # also of winch_1_joint
         r".*/joints\[[^\]]*?(\d+)\]\.position",
+        rf"{_BEFORE}{_WINCH}(?:[a-z]+[./_ ])*{TURNED}",
+        rf"{_BEFORE}(?:{_DRUM}[_ ]?{TURNED}|angles?|theta){_NUMBER}",
     ),
     "tensions": (
-        rf"{_BEFORE}{_OF}(?:tensions?|forces?|load[_ ]?cells?|f|t){_NUMBER}(?:[./_ ](?:data|value))*",
+        rf"{_BEFORE}{_OF}(?:tens(?:ions?)?|(?:tension|load)[_ ]?cells?|forces?|lc|f|t){_NUMBER}"
+        r"(?:[./_ ](?:data|value))*",
         rf"{_BEFORE}{_OF}(?:tensions?|forces?)[./_ ](?:data|values?|effort)\[(\d+)\]",
         rf".*{_WINCH}(?:[a-z]+[./_ ])?(?:tension|force)(?:[./_ ](?:data|value))*",
         rf"{_BEFORE}(?:tensions?|forces?)[./_ ](?:cable|rope|wire|winch)[_ ]?(\d+)",
-        rf".*{_SENSOR}[_ ]?(\d+)[./_ ](?:.*[./_ ])?force[./_ ]z",  # of a WrenchStamped
+        rf".*{_SENSOR}[_ ]?(\d+)[./_ ](?:.*[./_ ])?(?:force[./_ ]|f)z",  # of a WrenchStamped
     ),
     "position": (
         rf"{_BEFORE}(?:position|translation|pos|point)[./_ ]?([xyz])",
         r"/?[pt]?[_ ]?([xyz])",
         r".*/t([xyz])",
-        rf"{_BEFORE}{_BODY}(?:[./_ ]state)?[./_ ][pt]?([xyz])",
+        rf"{_BEFORE}{_BODY}(?:[./_ ]state)?[./_ ]?(?:pos[_ ]?)?[pt]?([xyz])",
+        rf"{_BEFORE}(?:position|pos|p)\[(\d)\]",  # of PX4, unless there are more than three
+        # PN, PE, PD, as in logs of ArduPilot
+        rf"{_BEFORE}(?:(?:pos[_ ]?|p)(?=[nedu]$)|(?=north|east|down|up))(north|east|down|up|[nedu])",
     ),
-    "quaternion": (
-        rf"{_BEFORE}(?:orientation|rotation|quaternion|quat|q)[./_ ]?([xyzw])",
-        r"(?:.*/)?r([xyzw])",
-        rf"{_BEFORE}q\[?([0-3])\]?",  # w, x, y, z, as in logs of PX4
+    "thrusts": (
+        rf"{_BEFORE}(?:collective[_ ]?)?(?:thrusts?|throttle|thr|tho){_SENSED}[_ ]?(\d*){_SENSED}",
+        rf"{_BEFORE}thrusts?{_SENSED}\[(\d*)\]",
     ),
-    "angles": (rf"{_BEFORE}(roll|pitch|yaw|heading|phi|theta|psi)", r"(?:.*/)?r([xyz])"),  # rx with a unit
-    "thrusts": (rf"{_BEFORE}thrusts?{_SENSED}[_ ]?\[?(\d*)\]?{_SENSED}",),
     "thrust_vectors": (rf"{_BEFORE}thrusts?{_SENSED}{_VECTOR}",),
-    "efforts": (r"/?cables[./]joints\[[^\]]*?(\d+)\]\.effort",),  # tensions in what towline writes
     "directions": (
         rf"{_BEFORE}{_OF}(?:{_DIRECTION}|q)[_ ./]?\[?(\d+)\]?{_VECTOR}",
         rf"{_BEFORE}{_CABLE}[_ ./](?:{_DIRECTION}|q){_VECTOR}",
         rf"{_BEFORE}{_DIRECTION}[_ ]{_CABLE}{_VECTOR}",
         rf"{_BEFORE}(?:(?:cable|rope|wire|tether)[_ ]?)?{_DIRECTION}(){_VECTOR}",  # of the only cable of a carrier
     ),
+    "quaternion": (
+        rf"{_BEFORE}(?:ori(?:entation)?|rot(?:ation)?|quaternion|quat|q)[./_ ]?([xyzw])",
+        r"(?:.*/)?r([xyzw])",
+        rf"{_BEFORE}q(?:uat)?_?\[?([0-3])\]?",  # w, x, y, z, as in logs of PX4
+    ),
+    "angles": (
+        rf"{_BEFORE}(roll|pitch|yaw|heading|phi|theta|psi)",
+        r"(?:.*/)?r([xyz])",  # with a unit
+        rf"{_BEFORE}(?:euler|rot|ang(?:les?)?|rpy)[./_ ]?(?:ang(?:les?)?[./_ ]?)?\[?([xyz012])\]?",
+    ),
+    "efforts": (r"/?cables[./]joints\[[^\]]*?(\d+)\]\.effort",),  # tensions in what towline writes
     "azimuths": (
         r".*(?:cable|rope|wire|tether|winch)[_ ]?(\d+)[./_ ](azimuth|elevation|swivel)",
         rf"{_BEFORE}{_OF}(?:dir(?:ection)?[_ ])?(azimuth|elevation|swivel)[_ ]?\[?(\d*)\]?",
     ),
     "time": (
-        r"(?:.*/)?[%_]*(t|(?:ros|sim|log|recv|rec|unix)?[_ ]?times?|time_?us(?:ec)?|time_?boot|secs?|seconds)",
-        rf"[%_]*({_BEFORE}(?:time[_ ]?)?stamp)",
+        r"(?:.*/)?[%_]*(t|ts|(?:ros|sim|log|recv|rec|unix|host|hw|sys|sample|date)?[_ ]?times?"
+        r"|time_?us(?:ec)?|time_?boot|secs?|seconds)",
+        rf"[%_]*({_BEFORE}(?:rosbag)?(?:time[_ ]?)?stamp)",
         r"(epoch|elapsed(?:[_ ]time)?|(?:sys(?:tem)?[_ ]?)?(?:ticks?|clock|uptime))",
         rf"{_BEFORE}((?:milli|micro|nano)s(?:ec(?:ond)?s?)?)",  # since an Arduino was switched on
     ),
@@ -92,11 +109,13 @@ DATES = 1e9, 4e9  # [s] from 1970, of recordings: 2001 to 2096
 LEAST_COUNTED, SLOWEST = 100.0, 0.5  # step of times that are no seconds; time between samples [s]
 # What is commanded rather than measured: cmd_l0, length_0_ref, /winch_commands/position[0].
 _COMMAND = re.compile(
-    r"[./_ ]?(?:cmd|commands?|commanded|desired|setpoints?|targets?|refs?|references?)(?=[./_ \[]|\d|$)"
+    r"[./_ ]?(?:cmd|commands?|commanded|desired|setpoints?|targets?|refs?|references?"
+    r"|(?<![a-z])(?:des|sp|goals?|set(?=_?pos|[./_ ]|\d|$)))(?=[./_ \[]|\d|$|pos)"
 )
 # What is measured, of columns that say so beside others: x_gt, l1_meas, actual_length_1.
 _MEASURED = re.compile(
-    r"[./_ ]?(?<![a-z])(?:meas(?:ured)?|act(?:ual)?|gt|ground[_ ]?truth|mocap|vicon|optitrack)(?![a-z])"
+    r"[./_ ]?(?<![a-z])(?:meas(?:ured)?|act(?:ual)?|fb|feedback|gt|ground[_ ]?truth|true"
+    r"|mocap|vicon|optitrack|imu|ahrs)(?![a-z])"
 )
 _WORDS = {unit: unit.lower() for unit in ("cm", "ms", "us", "ns", "s", *FORCES)}  # of units
 _WORDS |= {"s": "s|secs?|seconds?", "ms": "ms|milliseconds?", "us": "us|microseconds?", "ns": "ns|nanoseconds?"}
@@ -105,7 +124,8 @@ _WORDS |= {"deg": "deg|degrees?|°", "rad": "rad|radians?", "m": "m|met(?:er|re)
 _SUFFIX = re.compile(rf"(.+?)\s*(?:[_ ]|\()({'|'.join(_WORDS.values())})\)?")
 
 
-_ANGLES = {"x": "roll", "y": "pitch", "z": "yaw", "phi": "roll", "theta": "pitch", "psi": "yaw"} | {"heading": "yaw"}
+ANGLE_OF = dict(zip("xyz012", 2 * ("roll", "pitch", "yaw"), strict=True))
+ANGLE_OF |= {"phi": "roll", "theta": "pitch", "psi": "yaw", "heading": "yaw"}
 
 
 class Role(NamedTuple):
@@ -160,7 +180,9 @@ def _role(which: str, match: re.Match[str], unit: str, name: str) -> Role:
     if which == "quaternion" and parts[0].isdigit():
         parts = ["wxyz"[int(parts[0])]]
     if which == "angles":
-        parts = [_ANGLES.get(parts[0], parts[0])]
+        parts = [ANGLE_OF.get(parts[0], parts[0])]
+    if which == "position":
+        parts = [parts[0][0]]  # n of north
     if which == "time" and (short := re.search("us(?:ec)?$|(milli|micro|nano)s", text)):
         unit = {"milli": "ms", "nano": "ns"}.get(short[1] or "", "us")
     return Role(which, " ".join(parts), group, unit)
