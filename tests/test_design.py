@@ -335,7 +335,7 @@ def test_an_interrupt_while_the_layout_is_judged_keeps_it(monkeypatch):
 def test_from_random_layouts_and_for_equal_and_mirrored_points():
     """A start that knows nothing of the published layout; a symmetric robot stays symmetric."""
     robot = load("ipanema-2")
-    result = design(robot, requirements=wanted(robot, start="random", time_limit=2.0, seed=3))
+    result = design(robot, requirements=wanted(robot, start="random", time_limit=1.0, seed=3))
     assert result.margin > result.margin_before
     box = around(robot.anchors)
     box["min"][0] = 0.5
@@ -545,7 +545,7 @@ def test_where_the_margin_is_not_reached_the_gains_are_those_of_the_margin():
 
 def test_weaker_winches_are_enough_for_a_better_layout(tmp_path):
     robot = load("ipanema-2")
-    requirements = wanted(robot, minimise="t_max", margin=12.0, clearance=0.03, time_limit=4.0)
+    requirements = wanted(robot, minimise="t_max", margin=12.0, clearance=0.03, time_limit=2.0)
     fixed = design(robot, requirements=requirements | {"free": [winches(robot)], "time_limit": 0.5})
     (tmp_path / "wanted.yaml").write_text(json.dumps(requirements | {"free": [*requirements["free"], winches(robot)]}))
     done = towline("design", "ipanema-2", str(tmp_path / "wanted.yaml"), "--json", "--out", str(tmp_path / "out.yaml"))

@@ -151,7 +151,7 @@ def test_the_size_of_the_boxes_of_a_given_layout_is_that_of_a_bisection():
 
 
 def test_a_layout_for_the_largest_boxes_keeps_the_margin_in_them():
-    options = {"maximise": "volume", "margin": 10.0, "time_limit": 4.0}
+    options = {"maximise": "volume", "margin": 10.0, "time_limit": 2.0}
     found = design(ROBOT, POINTS, REQUIRE, **options)
     assert found.feasible
     assert found.size > 1.1 * found.size_before

@@ -139,7 +139,7 @@ def test_tension_rates_of_more_cables_than_needed_are_offered_by_their_least():
 
 def test_a_plan_without_a_solution_can_be_sent_to_another_process_with_its_relaxations():
     """Pickle a plan whose relaxations are not computed yet: what computes them holds programs, which no pickle has."""
-    task = TASK | {"tube": {"position": 0.02}, "steps": 12, "limits": {"tension_rate": 3}}
+    task = TASK | {"tube": {"position": 0.02}, "steps": 8, "limits": {"tension_rate": 3}}
     planned = plan(ROBOT, task)
     assert planned.status is MotionStatus.NOT_FOUND
     sent = pickle.loads(pickle.dumps(planned))
