@@ -162,8 +162,6 @@ def simulate(
         sensors = None if noise is None else read_yaml(noise, Noise)
         kind = dict(zip(CONTROLLERS, kinds, strict=True))[controller]
         known: dict[str, Any] = {} if kind is OpenLoop else {"sensors": sensors}
-        if kind is LengthControl:
-            known["damping"] = [cable.damping or 0.0 for cable in loaded.cables]  # as in the simulation
         pilot = kind(loaded, **known)
         air = None if wind is None else numbers("--wind", wind, 3)
         differs = None if mismatch is None else read_yaml(mismatch, Mismatch)

@@ -38,7 +38,7 @@ class LengthControl(Controller):
     where s are the strains at which cables with the stiffness EA and the file's damping have the planned tensions, x is
     the planned pose, J the Jacobian of the lengths, and e the error of the measured pose, whose rotation is a vector in
     {G}, so that no attitude is special. x and the tensions are those planned for the time at which the winches will
-    have followed. The tensions of a robot with more cables than degrees of freedom follow from the lengths; they are
+    have followed, x also for the end of the period. The tensions of a robot with more cables than degrees of freedom follow from the lengths; they are
     not controlled. With a lag, e and its integral are extrapolated to that time, to first order.
 
     Args:
@@ -47,7 +47,7 @@ class LengthControl(Controller):
             not stretch (also the default of a cable without a value in the file, if there are no more cables than
             degrees of freedom).
         damping: C [N s/m], a number or one for each cable, instead of the file's values; 2 ms times the stiffness is
-            assumed for a cable without a value in the file.
+            assumed for a cable without stiffness in the file.
         lag: Time constant with which the winches follow their commands [s]: lengths are commanded earlier by this time,
             and their corrections with as much lead.
         proportional, integral: P, and I [1/s]; 0 and 0 for lengths without correction. The default is the largest, up
@@ -97,7 +97,8 @@ class LengthControl(Controller):
         if not (self.stiffness > 0).all():
             raise InputError(f"stiffness must be positive, one or one for each cable, got {shown(stiffness)}")
         unknown = np.where(np.isfinite(self.stiffness), DAMPED * self.stiffness, 0.0)
-        own = [cable.damping or usual for cable, usual in zip(self.robot.cables, unknown, strict=True)]
+        known = [cable.damping or 0.0 if cable.stiffness else None for cable in self.robot.cables]
+        own = [usual if its is None else its for its, usual in zip(known, unknown, strict=True)]
         self._damping = repeated("damping", own if damping is None else damping, self.robot.m)
         if not (self._damping >= 0).all():
             raise InputError(f"damping must be at least 0, one or one for each cable, got {shown(damping)}")
@@ -106,9 +107,9 @@ class LengthControl(Controller):
         self._lag = number("lag", lag, 0.0, 1.0)
         self._proportional = None if proportional is None else number("proportional", proportional, 0.0, 100.0)
         self._integral = None if integral is None else number("integral", integral, 0.0, 1e3)
-        known = None if sensors is None else noise_of(sensors)
-        self._age = 0.0 if known is None else age_of(known)
-        self._gains = LengthGains(self.robot, self.stiffness, self._damping, self._lag, known)
+        noise = None if sensors is None else noise_of(sensors)
+        self._age = 0.0 if noise is None else age_of(noise)
+        self._gains = LengthGains(self.robot, self.stiffness, self._damping, self._lag, noise)
         given = [self._proportional, self._integral]
         self.corrects = any(given) or (None in given and any(self._gains_for(PERIOD, self._age)))
         if None in given and not self.corrects:
@@ -159,9 +160,13 @@ class LengthControl(Controller):
         return command._replace(answered=status, lengths=np.broadcast_to(lengths, command.tensions.shape))
 
     def _ahead(self, dt: float, reference: Reference) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the planned pose, poses of carriers and tensions at the time when the winches will have followed."""
+        """Return the planned pose, poses of carriers and tensions at the time when the winches will have followed.
+
+        They reach a length at the end of a period, as those of `Plant` and drives that interpolate. Tensions are not
+        extrapolated to it, because they may jump.
+        """
         lag, tensions = self._lag, reference.tensions
-        (pose, *_), (carriers, *_) = moved_on(reference[:3], lag), moved_on(reference[3:6], lag)
+        (pose, *_), (carriers, *_) = (moved_on(part, lag + (dt or PERIOD)) for part in (reference[:3], reference[3:6]))
         if tensions is None or not np.isfinite(tensions).all():
             if np.isfinite(self.stiffness).any():
                 raise InputError(
