@@ -38,8 +38,9 @@ class LengthControl(Controller):
     where s are the strains at which cables with the stiffness EA and the file's damping have the planned tensions, x is
     the planned pose, J the Jacobian of the lengths, and e the error of the measured pose, whose rotation is a vector in
     {G}, so that no attitude is special. x and the tensions are those planned for the time at which the winches will
-    have followed, x also for the end of the period. The tensions of a robot with more cables than degrees of freedom follow from the lengths; they are
-    not controlled. With a lag, e and its integral are extrapolated to that time, to first order.
+    have followed, x also for the end of the period. The tensions of a robot with more cables than degrees of freedom
+    follow from the lengths; they are not controlled. With a lag, e and its integral are extrapolated to that time, to
+    first order.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file. Its carriers must not fly.
