@@ -6,14 +6,17 @@ from .as_floats import ROUNDING
 
 GAINS = "kd", "kp", "ki"  # of the settings, in the order of the powers of the bandwidth
 LOOPS = "attitude", "place", "carrier_bandwidth", "observer"  # the other bandwidths of the settings
-HELD_FOR = 0.75  # over the bandwidth: the longest time between steps; from 1 on a loop is unstable (Jury)
+# Over the bandwidth of the error, and of carriers: the longest time between steps; from 1 on a loop is unstable (Jury).
+# Errors have an observer, tensions that are wrong, and a geometry that changes meanwhile.
+HELD_FOR, INNER = 0.6, 0.75
 
 
 class SlowLoops:
     """Lower the bandwidths of a controller whose steps are far apart, see `HELD_FOR`.
 
-    The attitude loops of flying carriers are the fastest, or the loops of other carriers that correct errors. All other
-    loops are closed around them, so they are lowered by the same factor.
+    The observer is lowered with the bandwidth of the error, if that is not given. The attitude loops of flying
+    carriers are the fastest, or the loops of other carriers that correct errors. All other loops are closed around
+    them, so they are lowered by the same factor.
 
     - `settings`: those of the controller, which are changed.
     - `adapts`: whether the bandwidth of the error may be lowered.
@@ -36,7 +39,7 @@ class SlowLoops:
     @property
     def longest_inner(self) -> float:
         """Return the longest time between steps for the loops of carriers [s], infinite if there are none."""
-        return HELD_FOR / max(float(self._settings[self._inner]), ROUNDING) if self._inner else np.inf
+        return INNER / max(float(self._settings[self._inner]), ROUNDING) if self._inner else np.inf
 
     def slow_down(self, period: float) -> tuple[float, float]:
         """Lower bandwidths for steps `period` [s] apart.
@@ -46,9 +49,9 @@ class SlowLoops:
         """
         given, most = self._bandwidth, 1.0 / period
         part = min(HELD_FOR / (period * given) if self._adapts else 1.0, self.longest_inner / period, 1.0)
+        for name in LOOPS if self._inner else LOOPS[-1:] if self._adapts else ():  # the last is the observer
+            self._settings[name] *= part
         if self._inner:
-            for name in LOOPS:
-                self._settings[name] *= part
             most = min(most, self._share * float(self._settings["attitude"]))
         if self._adapts:
             for order, name in enumerate(GAINS, 1):
