@@ -15,7 +15,7 @@ from ...base.display import Displayed
 from ...solvers import Certificate
 from ..tasks.deviation import Deviation
 from ..tasks.paths import Motion
-from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, MOST_SAMPLES, Scenario
+from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, MANY_SAMPLES, MOST_SAMPLES, Scenario, least_audit_rate
 from .checks import START_TENSIONS, excesses
 from .clearances import came_too_near
 from .drift import Drift, drift
@@ -91,7 +91,8 @@ def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False
     """
     intervals = scenario.output_samples
     if not to_show:  # a multiple: saved instants are audited ones
-        wanted = min(max(AUDIT_RATE * scenario.duration, LEAST_INTERVALS), MOST_SAMPLES)
+        many = max(least_audit_rate(scenario.task) * scenario.duration, MANY_SAMPLES)
+        wanted = min(max(AUDIT_RATE * scenario.duration, LEAST_INTERVALS), many, MOST_SAMPLES)
         intervals *= max(int(np.ceil(wanted / intervals - 1e-9)), 1)
     times = np.linspace(0.0, scenario.duration, intervals + 1)
     regular = instants(scenario, deviation, times)

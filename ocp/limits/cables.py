@@ -53,7 +53,7 @@ class CableSpeed(SomeCables):
 
     @override
     def values(self, state: State) -> ca.SX:
-        return state.rate(state.run.lengths)[self.cables]
+        return state.cable_speeds[self.cables]
 
 
 class CableAcceleration(SomeCables):
@@ -63,7 +63,7 @@ class CableAcceleration(SomeCables):
 
     @override
     def values(self, state: State) -> ca.SX:
-        return state.rate(state.rate(state.run.lengths))[self.cables]
+        return state.cable_accelerations[self.cables]
 
 
 class CableJerk(CableAcceleration, Rate):
@@ -79,7 +79,7 @@ class WinchPower(EachCable):
 
     @override
     def values(self, state: State) -> ca.SX:
-        return state.tensions * state.rate(state.run.lengths)
+        return state.tensions * state.cable_speeds
 
 
 class WinchForce(SomeCables):
@@ -94,7 +94,7 @@ class WinchForce(SomeCables):
     @override
     def values(self, state: State) -> ca.SX:
         inertia = ca.DM([winch.inertia if (winch := cable.winch) else 0.0 for cable in state.robot.cables])
-        return (state.tensions - inertia * state.rate(state.rate(state.run.lengths)))[self.cables]
+        return (state.tensions - inertia * state.cable_accelerations)[self.cables]
 
 
 class CableLength(Limit):

@@ -36,9 +36,10 @@ class ZoneSpeed(Magnitude):
         super().__init__(most)
         self._centre, self._radius, self.labels = centre, radius, (f"platform near {name}",)
 
-    def contains(self, positions: np.ndarray) -> np.ndarray:
-        """Return which positions (n, 3) [m] are in the zone, (n,)."""
-        return np.linalg.norm(positions - self._centre, axis=1) < self._radius
+    def bound(self, positions: np.ndarray) -> np.ndarray:
+        """Return the largest speed at positions (n, 3) [m], (n,) [m/s]."""
+        outside = np.linalg.norm(positions - self._centre, axis=1) - self._radius
+        return self.high + STEEPNESS * np.maximum(outside, 0.0)
 
     @override
     def values(self, state: State) -> ca.SX:

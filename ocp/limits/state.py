@@ -82,6 +82,16 @@ class State(Displayed):
         return kinematics.cables(self.robot, self.platform.pose, self.anchors, axes)
 
     @cached_property
+    def cable_speeds(self) -> ca.SX:
+        """Return the rates of the lengths of the cables, (m, 1) [m/s]; limits share the expression."""
+        return self.rate(self.run.lengths)
+
+    @cached_property
+    def cable_accelerations(self) -> ca.SX:
+        """Return the second derivatives of the lengths of the cables, (m, 1) [m/s^2]."""
+        return self.rate(self.cable_speeds)
+
+    @cached_property
     def efforts(self) -> list[tuple[Effort, ...]]:
         """Return the efforts that motion and cables require of each carrier."""
         robot, gravity = self.robot, np.array(self.robot.gravity)

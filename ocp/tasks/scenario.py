@@ -39,7 +39,8 @@ from .wind_set import WindBox, WindDisc, WindSet, as_wind, possible_winds_at
 
 POSITION, ATTITUDE = range(3), range(3, 6)
 AUDIT_RATE = 1000.0  # [1/s]: the audit looks at every millisecond
-LEAST_AUDIT_RATE = 100.0  # [1/s], of motions that last longer than a thousand seconds
+LEAST_AUDIT_RATE = 100.0  # [1/s], of motions for which `AUDIT_RATE` would take more than `MANY_SAMPLES`
+MANY_SAMPLES = 200_000
 LEAST_INTERVALS = 200  # of the audit: short motions are audited between their ends too
 START_BAND = 1e-4  # of the force scale: how far planned tensions may start from the measured ones
 MOST_SAMPLES = 1_000_000  # of the audit

@@ -34,6 +34,7 @@ MOST_IN_BENDS = 6400  # in all together, if that is more than LEAST in each
 CLOSE = 1e-9  # of s
 LOOKS = 2001  # points at which the geometry is checked
 HALVES = 40  # of the s between two of them
+FINE = 10  # times as many points at which the bound of a zone is known
 
 
 class PathLimits(NamedTuple):
@@ -119,14 +120,26 @@ class ParametrisedPath:
     def crossings(self, zone: ZoneSpeed) -> np.ndarray:
         """Return where the path enters or leaves a zone, (k,) of s: there the bound of the speed has a corner."""
         s = np.linspace(0.0, 1.0, LOOKS)
-        inside = zone.contains(self.at(s)[0].pose[:, :3])
+        inside = self._bound(zone, s) <= zone.high
         before = np.flatnonzero(inside[1:] != inside[:-1])
         low, high = s[before], s[before + 1]
         for _ in range(HALVES if before.size else 0):
             middle = (low + high) / 2
-            same = zone.contains(self.at(middle)[0].pose[:, :3]) == inside[before]
+            same = (self._bound(zone, middle) <= zone.high) == inside[before]
             low, high = np.where(same, middle, low), np.where(same, high, middle)
         return high
+
+    def rises(self, zone: ZoneSpeed, share: float) -> np.ndarray:
+        """Return points, (k,) of s, from each to the next of which the bound of a zone changes by so large a share.
+
+        Between two points of a grid the square of the speed is linear in s, and may exceed a bound that is not.
+        """
+        s = np.linspace(0.0, 1.0, FINE * LOOKS)
+        changed = np.cumsum(np.abs(np.diff(np.log(self._bound(zone, s)), prepend=np.nan)[1:]) / share)
+        return np.interp(np.arange(1.0, changed[-1]), changed, s[1:])
+
+    def _bound(self, zone: ZoneSpeed, s: np.ndarray) -> np.ndarray:
+        return zone.bound(self.at(s)[0].pose[:, :3])
 
     def until(self, path: Curve) -> float | None:
         """Return when a circle ends by its own time [s]; None for other paths, whose end is their own."""

@@ -42,6 +42,7 @@ RESERVE = 1e-7  # of the weight, kept from the tension limits against rounding
 LARGEST_RESERVE = 0.01  # of the weight
 LARGEST_SHRINK = 0.01
 COARSE = 4e-3  # of the weight: if more is missing it takes a finer grid, if less a reserve there
+RISE = 2.5  # intervals in which the bound of a zone changes e-fold, over all intervals
 CLOSEST = 1e-3  # of a step of a grid: points that are nearer to each other are one
 COARSE_EXCESS = 1e-4  # of a limit: if it is exceeded by more it takes a finer grid, if by less some distance everywhere
 
@@ -105,10 +106,12 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
     """Solve and audit; after a violation again, on a finer grid or with more distance from the limits."""
     margin, weight = task.margin, parametrised.robot.force_scale
     short, shrink, attempts, failures, weaker = list[_Stretches](), 0.0, 0, 0, np.zeros(parametrised.robot.m)
-    zones = [parametrised.crossings(limit) for limit in limits.speeds if isinstance(limit, ZoneSpeed)]
+    zones = [limit for limit in limits.speeds if isinstance(limit, ZoneSpeed)]
+    corners = np.concatenate([[], *(parametrised.crossings(zone) for zone in zones)])
     while True:
         attempts += 1
-        grids = [_through(s, np.concatenate([[], *zones])) for s in parametrised.pieces(intervals)]
+        rises = np.concatenate([[], *(parametrised.rises(zone, RISE / intervals) for zone in zones)])
+        grids = [_through(s, corners, rises) for s in parametrised.pieces(intervals)]
         pieces = [_piece(parametrised, limits, s, margin, _reserve(s, short, weight), shrink, weaker) for s in grids]
         s = np.concatenate([pieces[0].s[:1], *(piece.s[1:] for piece in pieces)])
         law = FastestLaw(parametrised, limits, margin, s, np.full(len(s), np.nan))
@@ -150,13 +153,17 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
             shrink = min(shrink + 2 * excess, LARGEST_SHRINK)
 
 
-def _through(s: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Return a grid whose nearest inner points are moved to corners of the bound of the speed.
+def _through(s: np.ndarray, corners: np.ndarray, rises: np.ndarray) -> np.ndarray:
+    """Return a grid with further points where the bound of the speed rises, and its nearest inner points at corners.
 
     A law that is slow enough at the first point in a zone would be too fast between its edge and that point.
     """
-    moved, left = s.copy(), np.arange(1, len(s) - 1)
     least = CLOSEST * (s[-1] - s[0]) / len(s)
+    further = np.sort(rises[(rises > s[0]) & (rises < s[-1])])
+    after = np.searchsorted(s, further)
+    apart = np.minimum(further - s[after - 1], s[after] - further) > least
+    s = np.sort(np.append(s, further[apart & (np.diff(further, prepend=-np.inf) > least)]))
+    moved, left = s.copy(), np.arange(1, len(s) - 1)
     corners = np.sort(corners)
     apart = (np.diff(corners, prepend=-np.inf) > least) & (corners > s[0] + least) & (corners < s[-1] - least)
     for corner in corners[apart][: left.size]:
