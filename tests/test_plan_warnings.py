@@ -139,6 +139,7 @@ SLIPPED = {
     "degrees": [
         {"path": LINE | {"end": [2, 1, 2, 0, 0, 45]}},
         {"tube": {"position": "free", "attitude": 20}},
+        {"tube": {"attitude": 5}},
         {"path": {"kind": "waypoints", "points": [[0, 0, 1, 0, 0, 0], [1, 0, 1, 0, 0, 90], [1, 1, 1, 0, 0, 180]]}},
     ],
     "degrees per second": [{"path": {"kind": "circle", "centre": [0, 0, 1.5], "radius": 0.8, "rate": 60}}],

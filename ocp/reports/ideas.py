@@ -4,17 +4,21 @@ None of them is planned, unlike relaxations. If there is a relaxation, positions
 Positions are checked at rest.
 """
 
+from collections.abc import Iterator
+from itertools import chain
+
 import numpy as np
 
 from ...base.display import Fact
 from ...base.text import quantity, quantity_row
 from ..audits.excess import TENSIONS
 from ..global_path.at_rest import AtRest
+from ..global_path.shortest_shifts import shortest_shifts
 from ..global_path.space import Space
 from ..proofs.too_heavy import OF_WEIGHT
 from ..result import PlanData
 from ..tasks.paths import LinePath
-from ..tasks.scenario import ATTITUDE, POSITION, Scenario
+from ..tasks.scenario import ATTITUDE, Scenario
 from ..tasks.task_limits import OF_BODY
 from ..tasks.wind_set import WindBox, WindDisc
 from ..warnings.long_turns import OTHER_WAY
@@ -24,7 +28,7 @@ from ..warnings.slipped_units import READS
 IN_THE_WAY = {"keep_out", "cable_clearance", *OF_BODY}
 TO_MOVE = 1.5  # times what carries the weight: tilted thrust and acceleration need more
 FELT = 0.02  # of the weight: a wind with less force is hardly why tensions are missing
-STEPS = 100  # from an end of the path to the farthest position that is tried
+STEPS = 100  # of the robot's size: its positions are offered in round steps that are at most so long
 ALONG = 51  # positions of a line that are checked
 ENDS = ("start", "end")
 
@@ -127,26 +131,31 @@ def _nearest(
     For a line that the platform follows, the nearest from which that line to the `other` end is clear is preferred.
     Also return whether it is, or whether the tube is wide enough for the planner to leave the line by that distance.
     """
-    (from_, loose), axes = space.references, [axis for axis in POSITION if scenario.robot.dof_mask[axis]]
-    points = np.vstack([scenario.robot.home_anchors, from_[:, :3]])
-    step = 10.0 ** np.floor(np.log10(float(np.linalg.norm(np.ptp(points, axis=0))) / STEPS))
-    ways = [sign * np.eye(3)[axis] for axis in axes for sign in (1, -1)]
-    away = step * np.arange(1, 5 * STEPS)
-    nearest = []
-    for way in ways:
-        clear = _slack(kept, space, from_[end], loose[end], away[:, None] * way) >= 0
-        clear = clear[:-1] & clear[1:]  # a step farther than necessary
-        if clear.any():
-            nearest.append((away[1 + clear.argmax()], way))
-    places = [from_[end, :3] + far * way for far, way in sorted(nearest, key=lambda pair: pair[0])]
+    (from_, loose), anchors = space.references, scenario.robot.home_anchors
+    size = float(np.linalg.norm(np.ptp(np.vstack([anchors, from_[:, :3]]), axis=0)))
+    step, start = 10.0 ** np.floor(np.log10(size / STEPS)), from_[end, :3]
+
+    def holds(*moved: np.ndarray) -> bool:
+        return bool((_slack(kept, space, from_[end], loose[end], np.array(moved)) >= 0).all())
+
+    def clear() -> Iterator[np.ndarray]:
+        """Yield the nearest clear positions, a step farther than necessary, at a round distance."""
+        for shift in shortest_shifts(scenario, size, holds):
+            far = np.linalg.norm(shift)
+            by = shift * (step * (np.ceil(far / step) + 1) / far)
+            if holds(by):
+                yield start + by
+
+    places = clear()
+    nearest = next(places, None)
     width = scenario.task.tube.position or 0.0
-    leaves = width == "free" or (bool(places) and float(np.linalg.norm(places[0] - from_[end, :3])) <= width)
-    if isinstance(scenario.task.path, LinePath) and not leaves:
-        share = np.linspace(0.0, 1.0, ALONG)[:, None]
-        lines = ((place, place + share * (other - place) - from_[end, :3]) for place in places)
-        straight = [place for place, line in lines if (_slack(kept, space, from_[end], loose[end], line) >= 0).all()]
-        return next(iter(straight or places), None), bool(straight)
-    return next(iter(places), None), True
+    leaves = width == "free" or (nearest is not None and float(np.linalg.norm(nearest - start)) <= width)
+    if nearest is None or leaves or not isinstance(scenario.task.path, LinePath):
+        return nearest, True
+    share = np.linspace(0.0, 1.0, ALONG)[:, None]
+    lines = ((place, place - start + share * (other - place)) for place in chain([nearest], places))
+    straight = next((place for place, line in lines if holds(*line)), None)
+    return nearest if straight is None else straight, straight is not None
 
 
 def _slack(kept: AtRest, space: Space, pose: np.ndarray, carriers: np.ndarray, moved: np.ndarray) -> np.ndarray:

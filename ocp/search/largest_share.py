@@ -71,8 +71,8 @@ def together(search: Search, scenario: Scenario, makers: Sequence[Maker]) -> lis
     """Return changes that make a motion feasible only together; [] if all of them do not.
 
     Each change is as easy as can be at first. One after another, in the order of `makers`, is left out if the others
-    suffice without it, unless only programs show that. Those that remain have the largest share that all can have, and
-    then each as much as it can.
+    suffice without it; where only programs show that, at the end. Those that remain have the largest share that all can
+    have, and then each as much as it can.
     """
 
     def easy(makers: Sequence[Maker]) -> bool:
@@ -98,8 +98,16 @@ def together(search: Search, scenario: Scenario, makers: Sequence[Maker]) -> lis
     if found is None:
         return []
     part, plan = found
-    changes, _ = _changed(scenario, kept, part * shares)
-    offered = zip(changes, part * shares, strict=True)
+    shares = part * shares
+    for make in tuple(kept) if by_programs(scenario) else ():  # what the closest of all motions can do without
+        left = np.array([each is not make for each in kept])
+        others = [each for each in kept if each is not make]
+        varied = _legal(lambda _, those=others, its=shares[left]: _changed(scenario, those, its)[1], 1.0)
+        guess = plan.deviation
+        if others and varied and (without := planned(search, varied, "audit, fewer changes together", guess)):
+            kept, shares, plan = others, shares[left], without
+    changes, _ = _changed(scenario, kept, shares)
+    offered = zip(changes, shares, strict=True)
     return [change.offer(max(float(share), change.least), plan) for change, share in offered]
 
 

@@ -6,18 +6,17 @@ from ...base.text import quantity, quantity_row
 from ...solvers.margins import margins
 from ..audits.tensions import scaled
 from ..global_path.at_rest import AtRest
+from ..global_path.shortest_shifts import shortest_shifts
 from ..result import Relaxed
 from ..tasks.paths import CirclePath, FeedPath, LinePath, WaypointPath
 from ..tasks.paths.shifted import shifted, shrunk
-from ..tasks.scenario import POSITION, Scenario
-from .largest_share import HALVINGS, RESERVES, Change, Variation, along
+from ..tasks.scenario import Scenario
+from .largest_share import RESERVES, Change, Variation, along
 from .relaxations import planned, rounded
 from .search import Search
 
 LEAST = 0.05  # of a path: with less, other changes are better advice
 PLACES = 31  # of a path, at which a shifted one is compared
-SHIFT_STEP = 1.3  # of a shift to the next one that is tried
-SHIFTS = SHIFT_STEP ** np.arange(-36, 0)  # that are tried, in parts of the distance between the farthest anchors
 YAWS = np.deg2rad(np.arange(-180, 180, 5))  # that are tried
 
 
@@ -94,20 +93,8 @@ def shifted_path(search: Search, scenario: Scenario) -> list[Relaxed]:
         poses[:, :3] += by
         return bool((kept(poses, carriers.pose).slack >= 0).all())
 
-    if holds(np.zeros(3)):
-        return []
-    shortest = np.full(3, np.inf)
-    for way in (sign * np.eye(3)[axis] for axis in POSITION if robot.dof_mask[axis] for sign in (1, -1)):
-        far = next((far for far in SHIFTS * size if far < np.abs(shortest).max() and holds(far * way)), None)
-        if far is None:
-            continue
-        low, high = far / SHIFT_STEP, far
-        for _ in range(HALVINGS // 2):
-            middle = (low + high) / 2
-            low, high = (low, middle) if holds(middle * way) else (middle, high)
-        if high < np.abs(shortest).max():
-            shortest = high * way
-    if np.isinf(shortest).any():
+    shortest = None if holds(np.zeros(3)) else next(shortest_shifts(scenario, size, holds), None)
+    if shortest is None:
         return []
     axis = int(np.abs(shortest).argmax())
     for reserve in RESERVES:

@@ -6,6 +6,7 @@ from typing import Any
 from ...base.errors import InputError
 from ...models import Robot
 from ...models.dynamics import dynamics_of
+from ..limits.limits import Limits
 from .carrier_paths import carrier_paths
 from .ends import with_timing
 from .initial import Initial
@@ -16,11 +17,16 @@ from .scenario import ATTITUDE, POSITION, Scenario
 from .task import FreeBase, GivenBase, HoldBase, Task
 from .task_checks import check_scenario, check_task
 
+OF_LIMITS = {"limits", "margin", "base", "phases", "tube"}  # the fields of a task that its limits depend on
 
-def lay_out(robot: Robot, task: Task, initial: Initial | Measured | dict[str, Any] | None = None) -> Scenario:
+
+def lay_out(
+    robot: Robot, task: Task, initial: Initial | Measured | dict[str, Any] | None = None, limits: Limits | None = None
+) -> Scenario:
     """Check that `task` fits `robot` and lay it out.
 
-    `initial`: the state from which the motion starts, instead of the task's (`initial_of`).
+    `initial`: the state from which the motion starts, instead of the task's (`initial_of`). `limits`: those of a task
+    with the same `OF_LIMITS`, whose functions are built already.
 
     Raises `InputError` naming the field of the task that does not fit, its value and the accepted values.
     """
@@ -35,7 +41,7 @@ def lay_out(robot: Robot, task: Task, initial: Initial | Measured | dict[str, An
         relative=task.path.frame != "world",
         platform_free=[coordinate for coordinate in opened if robot.dof_mask[coordinate]],
         carrier_free=_free_carriers(robot, task.base, f"task {task.name!r}"),
-        limits=limit_list(robot, task),
+        limits=limit_list(robot, task) if limits is None else limits,
         carrier_paths=carrier_paths(robot, task),
         duration=task.seconds,
     )
@@ -48,7 +54,8 @@ def lay_out(robot: Robot, task: Task, initial: Initial | Measured | dict[str, An
 
 def with_task(scenario: Scenario, **changes: Any) -> Scenario:
     """Return the scenario of a task with other values of some fields, laid out for the same robot."""
-    return lay_out(scenario.robot, scenario.task.model_copy(update=changes))
+    limits = scenario.limits if OF_LIMITS.isdisjoint(changes) else None
+    return lay_out(scenario.robot, scenario.task.model_copy(update=changes), limits=limits)
 
 
 def _free_carriers(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: str) -> list[tuple[int, int]]:

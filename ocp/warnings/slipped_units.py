@@ -111,7 +111,7 @@ def _unusual(robot: Robot, numbers: list[_Number]) -> Iterator[_Suspect]:
     strongest, liftable = float(t_max.max()), float(t_max.sum()) / max(float(np.linalg.norm(robot.gravity)), 1e-9)
     weight = robot.weight / robot.m  # that a cable carries
     usual = [  # unit, pattern of keys, least and most; the first that matches decides
-        ("rad", "path|pose|home|attitude|around", 0.0, 2 * np.pi + 0.1),
+        ("rad", r"path|pose|home|(?<!^tube\.)attitude|around", 0.0, 2 * np.pi + 0.1),
         ("rad", "", 0.0, np.pi / 2 + 0.1),  # of a limit
         ("rad/s", "", 0.0, 20.0),
         ("wind", "^wind", 0.0, 33.0),  # of a hurricane

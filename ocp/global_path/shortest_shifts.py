@@ -1,0 +1,28 @@
+"""The shortest shifts along the axes of {G} to where a robot can be: `shortest_shifts`."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from ..tasks.scenario import POSITION, Scenario
+
+STEP = 1.3  # of a shift to the next one that is tried
+SHIFTS = STEP ** np.arange(-36, 3)  # that are tried, in parts of the robot's size
+HALVINGS = 5
+
+
+def shortest_shifts(scenario: Scenario, size: float, holds: Callable[[np.ndarray], bool]) -> Iterator[np.ndarray]:
+    """Yield the shortest shift (3,) [m] that `holds` in each direction along an axis that the platform has.
+
+    The shortest of all comes first. `size` is that of the robot [m].
+    """
+    ways = [sign * np.eye(3)[axis] for axis in POSITION if scenario.robot.dof_mask[axis] for sign in (1, -1)]
+    for far in SHIFTS * size:
+        found = []
+        for k in [k for k, way in enumerate(ways) if holds(far * way)][::-1]:
+            way, low, high = ways.pop(k), far / STEP, far
+            for _ in range(HALVINGS):
+                middle = (low + high) / 2
+                low, high = (low, middle) if holds(middle * way) else (middle, high)
+            found.append((high, way))
+        yield from (high * way for high, way in sorted(found, key=lambda pair: pair[0]))
