@@ -1,7 +1,7 @@
 """`grows`: whether small errors at home grow in the whole closed loop."""
 
+import hashlib
 import pickle
-from functools import lru_cache
 
 import numpy as np
 
@@ -19,6 +19,8 @@ LEAST, SLOW, MOST = 400, 4.0, 1500  # steps, time constants of the errors, and s
 FAR = 0.3  # of the robot's length: errors that have grown
 MORE = 1.2  # of the velocities in the second third of the steps are in the last: a motion nobody damps has as many
 PUSH, PUSHED = 0.01, 0.05  # of the robot's weight, and for how long [s]: so little that the loop is that of first order
+
+_KEPT: dict[tuple[type[ComputedTorque], bytes], bool] = {}
 
 
 def grows(controller: ComputedTorque, robot: Robot, rest: TensionSolution, bandwidth: float) -> bool:
@@ -38,13 +40,11 @@ def grows(controller: ComputedTorque, robot: Robot, rest: TensionSolution, bandw
         state = pickle.dumps(given)
     except (AttributeError, TypeError, pickle.PicklingError):  # as of a class that is defined in a function
         return _simulated(*given)
-    return _kept(type(controller), state)
-
-
-@lru_cache(maxsize=8)
-def _kept(kind: type[ComputedTorque], state: bytes) -> bool:
-    """Return what the simulation shows; a class that is defined anew is another `kind`, though its name is the same."""
-    return _simulated(*pickle.loads(state))
+    # A class that is defined anew is another one, though its name is the same.
+    key = type(controller), hashlib.sha256(state).digest()
+    if key not in _KEPT:
+        _KEPT[key] = _simulated(*pickle.loads(state))
+    return _KEPT[key]
 
 
 def _simulated(controller: ComputedTorque, robot: Robot, tensions: np.ndarray, bandwidth: float) -> bool:
