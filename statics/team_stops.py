@@ -295,10 +295,8 @@ def _forces(
     A, tensions, missing = _of_plan(robot, trajectory, planned, carriers)
     if (beyond := after[:, None] > 0).any():
         last = _of_plan(robot, trajectory, *trajectory.at(before(trajectory.duration or 0.0)))
-        last_ones = slopes(
-            np.log(np.maximum(last[1], SLACK * robot.t_max))
-        )  # logarithms, so that tensions stay positive
-        tensions = np.where(beyond, np.exp(faded(last_ones, np.maximum(after, 0.0))[0]), tensions)
+        logarithms = slopes(np.log(np.maximum(last[1], SLACK * robot.t_max)))  # so that all tensions stay positive
+        tensions = np.where(beyond, np.exp(faded(logarithms, np.maximum(after, 0.0))[0]), tensions)
         missing = np.where(beyond, last[2][2:], missing)
     now = dynamics_of(robot).required_wrench(*platform, wind=trajectory.wind)
     wanted = scale * (now - (A @ tensions[..., None])[..., 0] - kept[:, None] * missing)[:, rows]
