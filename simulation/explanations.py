@@ -1,7 +1,7 @@
 """`Matching`: a recording compared with its plant, and which of the model's parameters explains the difference."""
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,8 +14,13 @@ RANGES = {
     "friction": (0.0, 1e5, 0.1),
     "mass": (0.2, 5.0, 0.01),
     "stiffness": (0.1, 10.0, 0.02),
+    "tilt": (-0.5, 0.5, 2e-3),
+    "load_cells": (-0.9, 10.0, 0.01),
+    "cable_friction": (-1e5, 1e5, 0.1),
 }
+ALONE = ("delay", "friction", "mass", "stiffness")  # parameters of one number, which a fit may write
 STEPS, HALVINGS = 4, 3  # of Gauss and Newton, and of a step that is too long
+LEAST = 0.5, 0.2  # share that a parameter of several numbers, or of one, must explain to be named
 REMOVED = 0.01  # of the sum of squares, from which on a parameter is named
 NOTHING = 0.5  # of the sum of squares that noise has: less needs no explanation
 DOUBT = 5e-4  # probability, on each side, that a parameter is named which only the scatter of the windows changes
@@ -30,12 +35,12 @@ LOST = 1e6  # what a residual is where the simulation diverges
 class Explanation(NamedTuple):
     """Share of the residuals that one parameter alone explains."""
 
-    name: str  # "delay", "friction", "mass" or "stiffness"
+    name: str  # a field of `Parameters`
     # its value in the model, the value with the least residual and the standard deviation of that, by the scatter of
-    # the windows and the noise: in [s], [N], or as a factor of the file's
-    before: float
-    value: float
-    sigma: float
+    # the windows and the noise: in [s], [N], or as a factor of the file's; several numbers as in `Parameters`
+    before: Any
+    value: Any
+    sigma: Any
     explained: float  # share of the squared residuals beyond the noise that it removes
     shown: bool  # True if the recording shows it well enough to be found
     named: bool  # True if it certainly explains something
@@ -118,32 +123,45 @@ class Matching:
         return Match(parameters, away[:, : -self.windows.start.shape[1]], self._project(away))
 
     def slope(self, parameters: Parameters, name: str) -> np.ndarray:
-        """Return the derivative of the residuals by a parameter, (W, R + P)."""
-        (_, high, step), value = RANGES[name], getattr(parameters, name)
-        step = step if value + step <= high else -step
-        ends = [self.windows.predict(parameters._replace(**{name: one}))[0] for one in (value + step, value)]
-        change = np.nan_to_num((ends[0] - ends[1]) / step)
-        return self._project(np.concatenate([change, np.zeros_like(self.windows.start)], axis=1))
+        """Return the derivatives of the residuals by a parameter of k numbers, (k, W, R + P)."""
+        (_, high, step), value = RANGES[name], np.atleast_1d(getattr(parameters, name))
+        first, slopes = self.windows.predict(parameters)[0], []
+        for number in range(len(value)):
+            away = (step if value[number] + step <= high else -step) * np.eye(len(value))[number]
+            end = self.windows.predict(_with(parameters, name, value + away))[0]
+            change = np.nan_to_num((end - first) / away[number])
+            slopes.append(self._project(np.concatenate([change, np.zeros_like(self.windows.start)], axis=1)))
+        return np.array(slopes)
 
-    def fitted(self, first: Match, name: str, used: np.ndarray) -> tuple[Match, float]:
-        """Fit one parameter alone to windows `used`, (W,) of bool; return the match, and the standard deviation."""
-        best, sigma, (low, high, _) = first, np.inf, RANGES[name]
+    def fitted(self, first: Match, name: str, used: np.ndarray) -> tuple[Match, np.ndarray]:
+        """Fit one parameter alone to windows `used`, (W,) of bool; return the match, and standard deviations (k,)."""
+        (low, high, _), best, size = RANGES[name], first, np.size(getattr(first.parameters, name))
+        usual = self.windows.usual_tension if name == "cable_friction" else 1.0
+        sigma, least = np.full(size, np.inf), 0.0 if size == 1 else 1 / (SHOWN * usual) ** 2
         for _ in range(STEPS):
-            slope, value = self.slope(best.parameters, name)[used], getattr(best.parameters, name)
-            steep, along = np.sum(slope**2, axis=1), np.sum(slope * best.left[used], axis=1)
-            if not steep.sum() > 0:
+            slope, value = self.slope(best.parameters, name)[:, used], np.atleast_1d(getattr(best.parameters, name))
+            steep = np.einsum("iwr,jwr->wij", slope, slope)
+            along = np.einsum("iwr,wr->wi", slope, best.left[used])
+            if not np.trace(steep.sum(axis=0)) > 0:
                 break
-            change = -along.sum() / steep.sum()
-            scatter = np.sqrt(np.sum((along + change * steep) ** 2))
+            values, along_of = np.linalg.eigh(steep.sum(axis=0))
+            kept = values > least  # directions of several numbers that the recording does not show stay
+            inverse = (along_of[:, kept] / values[kept]) @ along_of[:, kept].T
+            change = -inverse @ along.sum(axis=0)
             # What as much noise again would change, also on average: simulated tensions end at zero.
-            sigma = float(np.hypot(scatter, np.sum(slope * self._echoed[used])) / steep.sum())
-            trials = (float(np.clip(value + change / 2**i, low, high)) for i in range(HALVINGS))
-            matches = (self.at(best.parameters._replace(**{name: trial})) for trial in trials)
+            echo = np.einsum("iwr,wr->i", slope, self._echoed[used])
+            scatter = np.vstack([along + steep @ change, echo]) @ inverse
+            sigma = np.sqrt(np.sum(scatter**2, axis=0))
+            sigma[np.diagonal(inverse) * np.diagonal(steep.sum(axis=0)) < 0.5] = (
+                np.inf
+            )  # those that are left as they are
+            trials = (np.clip(value + change / 2**i, low, high) for i in range(HALVINGS))
+            matches = (self.at(_with(best.parameters, name, trial)) for trial in trials)
             better = next((one for one in matches if one.cost[used].sum() < best.cost[used].sum()), None)
             if better is None:
                 break
             best = better
-            if abs(getattr(best.parameters, name) - value) < 0.1 * sigma:
+            if (np.abs(np.atleast_1d(getattr(best.parameters, name)) - value) < 0.1 * sigma).all():
                 break
         return best, sigma
 
@@ -153,33 +171,53 @@ class Matching:
 
         found, whole, count = [], first.cost[used].sum(), float(np.count_nonzero(first.left[used]))
         certain = float(stdtrit(max(int(used.sum()) - 1, 1), 1 - DOUBT))  # quantile of Student's t
-        tensions = self.windows.recorded.tensions
-        usual = self.windows.robot.force_scale if tensions is None else float(np.median(np.abs(tensions)))
+        usual = self.windows.usual_tension
         for name in applicable(self.windows):
             match, sigma = self.fitted(first, name, used)
-            before, value = (getattr(one.parameters, name) for one in (first, match))
+            before, value = (np.atleast_1d(getattr(one.parameters, name)) for one in (first, match))
             removed = whole - match.cost[used].sum()
-            size = {"delay": 0.1, "friction": max(10 * value, 0.1 * usual)}.get(name, 1.0)
-            shown = sigma < SHOWN * size and RANGES[name][0] < value + (name == "friction") < RANGES[name][1]
+            size = {"delay": 0.1, "friction": max(10 * value[0], 0.1 * usual), "cable_friction": usual}.get(name, 1.0)
+            certainly = np.abs(value - before) > certain * sigma
+            low, high, _ = RANGES[name]
+            inside = bool(((low < value + (name == "friction")) & (value < high)).all())
+            shown = inside and bool((sigma[certainly] if certainly.any() else sigma).max() < SHOWN * size)
             if name == "stiffness":  # noise of lengths, which it multiplies, would make it too small
                 noise = np.sum(self._echoed[used] ** 2)
-                shown = shown and noise <= BLURRED * np.sum(self.slope(first.parameters, name)[used] ** 2)
-            changed = abs(value - before) > certain * sigma and removed > REMOVED * whole
-            named = bool(shown and changed and whole > NOTHING * count)
+                shown = shown and noise <= BLURRED * np.sum(self.slope(first.parameters, name)[:, used] ** 2)
             explained = float(removed / max(whole - count, removed, 1e-12))
-            found.append((Explanation(name, before, value, sigma, explained, bool(shown), named), match))
-        return sorted(found, key=lambda one: (not one[0].shown, -one[0].explained))
+            least = LEAST[int(name in ALONE)]
+            named = shown and bool(certainly.any()) and explained > least and removed > REMOVED * whole
+            named = bool(named and whole > NOTHING * count)
+            old, new, sigma = (_plain(one) for one in (before, value, sigma))
+            found.append((Explanation(name, old, new, sigma, explained, bool(shown), named), match))
+        return sorted(found, key=lambda one: (not one[0].named, not one[0].shown, -weight(one[0])))
 
 
 def applicable(windows: Windows) -> Sequence[str]:
     """Return the parameters on which a simulation with such commands depends."""
     recorded = windows.recorded
     felt = windows.drive != "lengths" or (recorded.tensions is not None and recorded.robot.fixed_lengths is None)
-    names = {"delay": windows.commanded, "friction": felt, "mass": True}
-    return [name for name, depends in (names | {"stiffness": windows.drive != "tensions"}).items() if depends]
+    names = {"delay": windows.commanded, "friction": felt, "mass": True, "stiffness": windows.drive != "tensions"}
+    names |= {"tilt": True, "load_cells": recorded.tensions is not None, "cable_friction": felt}
+    return [name for name, depends in names.items() if depends]
+
+
+def weight(one: Explanation) -> float:
+    """Return the share of an explanation, less if it has several numbers, which explain more than one number does."""
+    return one.explained * (1 - TIED * min(np.size(one.value) - 1, 2) / 2)
+
+
+def _with(parameters: Parameters, name: str, value: np.ndarray) -> Parameters:
+    return parameters._replace(**{name: _plain(value)})
+
+
+def _plain(value: np.ndarray) -> Any:
+    return float(value[0]) if len(value) == 1 else tuple(value.tolist())
 
 
 def tied(found: Sequence[Explanation]) -> list[str]:
     """Return the name that explains most, and those of others that explain as much; none if it explains nothing."""
     least = (1 - TIED) * found[0].explained if found and found[0].named else np.inf
-    return [one.name for one in found if one.named and one.explained >= least]
+    return [
+        one.name for one in found if one.named and one.explained >= least and (one is found[0] or one.name in ALONE)
+    ]

@@ -25,7 +25,7 @@ from ..figures.report import Report, Reported, Section, Table
 from ..models.files import AnyRobot, as_robot
 from ..models.parsing import to_yaml
 from ..models.robot import Robot
-from .explanations import Explanation, Matching, tied
+from .explanations import ALONE, Explanation, Matching, tied
 from .replayed_robot import Parameters, changed
 from .tolerance import tolerance_of
 from .windows import Windows
@@ -191,7 +191,7 @@ class Replay(Drawn, Reported, Displayed):
         from ..figures.replay import replay as draw
 
         after = self.explained or {}
-        by = self.found[0].name if after else ""
+        by = _words(self.found[0].name) if after else ""
         return {"replay": draw(self._times, self.residuals, after, self.matching.noise, self._summary(), by)}
 
     def _report(self) -> Report:
@@ -220,14 +220,14 @@ class Replay(Drawn, Reported, Displayed):
             return f"{text}; {self.windows.recorded.doubt}"
         if self.named:
             best = self.found[0]
-            text += (
-                f"; {' or '.join(self.named)} explains {_share(best)} of the residuals: {_value(best.name, best.value)}"
-            )
+            verb = "explain" if best.name.endswith("s") and best.name != "stiffness" else "explains"
+            text += f"; {' or '.join(map(_words, self.named))} {verb} {_share(best)} of the residuals: "
+            text += _value(best.name, best.value)
             after = self._rms(self.explained or {})
             more = any(after[name] > 2 * noise[name] for name in after)
             return f"{text}; the remainder has other causes" if more else text
         if max(ratios.values()) > 2:
-            return f"{text}; none of {', '.join(one.name for one in self.found)} explains it"
+            return f"{text}; none of {', '.join(_words(one.name) for one in self.found)} explains it"
         away = self._times[~self.matching.kept]
         where = f" except for {counted(len(away), 'outlying window')} from {away[0, 0]:.4g} s on" if len(away) else ""
         return f"{text}; the model reproduces the recording{where}"
@@ -245,7 +245,7 @@ class Replay(Drawn, Reported, Displayed):
         if self.fitted is not None and self.validation is not None:
             first, (before, after) = self.matching.first.parameters, self.validation
             values = [
-                f"{name} {_value(name, value)}"
+                f"{_words(name)} {_value(name, value)}"
                 for name, value in self.fitted._asdict().items()
                 if value != getattr(first, name)
             ]
@@ -260,7 +260,7 @@ class Replay(Drawn, Reported, Displayed):
         for (name, value), noise in zip(self.rms().items(), self.matching.noise.values(), strict=True):
             fitted = [_of(name, after[name])] if after else []
             rows.append([name, _of(name, value), _of(name, noise), f"{value / noise:.2f}", *fitted])
-        columns = ["", "rms", "noise", "ratio", *([f"with {self.found[0].name} fitted"] if after else [])]
+        columns = ["", "rms", "noise", "ratio", *([f"with {_words(self.found[0].name)} fitted"] if after else [])]
         return Table("Residuals, measured minus simulated", columns, rows, (1, 2, 3, 4))
 
     def _explanation_table(self) -> Table:
@@ -269,12 +269,15 @@ class Replay(Drawn, Reported, Displayed):
             remark = "" if one.named else "no reduction" if one.shown else "not determined by this recording"
             if one.name in self.named[1:]:
                 remark = "not distinguishable from the first"
-            if one.name in FACTORS:
+            if one.name not in ALONE:
+                sigma = ""
+            elif one.name in FACTORS:
                 sigma = f"{max(100 * one.sigma, 0.001):.2g} %"
             else:
                 sigma = quantity(1e3 * one.sigma, "ms", 2) if one.name == "delay" else quantity(one.sigma, "N", 2)
-            value = f"{_value(one.name, one.value)} +- {sigma}" if one.shown else "-"
-            rows.append((one.name, _value(one.name, one.before), value, _share(one) if one.named else "-", remark))
+            value = _value(one.name, one.value) + (f" +- {sigma}" if sigma else "") if one.shown else "-"
+            before = _value(one.name, one.before) if sigma else "-"
+            rows.append((_words(one.name), before, value, _share(one) if one.named else "-", remark))
         title, columns = "Parameters that may explain them, each fitted alone", ("", "model", "best", "explains", "")
         return Table(title, columns, rows, (1, 2, 3))
 
@@ -328,12 +331,15 @@ def _fitted(matching: Matching) -> tuple[Parameters, tuple[float, float]]:
     number_of = np.arange(len(matching.kept))
     fits = number_of // (BLOCK if len(number_of) > BLOCK else 1) % 2 == 0
     used, others = matching.kept & fits, matching.kept & ~fits
-    best, left = matching.first, set(Parameters._fields)
-    while left and used.any() and others.any():
-        found = next((one for one in matching.explanations(best, used) if one[0].named and one[0].name in left), None)
-        if found is None or found[1].cost[others].sum() > GAIN * best.cost[others].sum():
+    best, done = matching.first, set[str]()
+    while used.any() and others.any():
+        found = next(
+            (one for one in matching.explanations(best, used) if one[0].named and one[0].name not in done), None
+        )
+        # What explains most must have a place in the file, or else a wrong parameter would be written.
+        if found is None or found[0].name not in ALONE or found[1].cost[others].sum() > GAIN * best.cost[others].sum():
             break
-        left.remove(found[0].name)
+        done.add(found[0].name)
         best = found[1]
     size = max(int(np.count_nonzero(matching.first.left[others])), 1)
     before, after = (float(np.sqrt(match.cost[others].sum() / size)) for match in (matching.first, best))
@@ -352,10 +358,24 @@ def _of(kind: str, value: float) -> str:
     return quantity(scale * value, unit, 3)
 
 
-def _value(name: str, value: float) -> str:
+def _value(name: str, value: Any) -> str:
+    if name == "tilt":
+        return quantity(float(np.degrees(np.linalg.norm(value))), "deg", 3)
+    if name == "cable_friction":
+        largest = int(np.argmax(np.abs(value)))
+        return f"up to {quantity(value[largest], 'N', 3)}, of cables[{largest}]"
+    if name == "load_cells":
+        gains, zeros = np.reshape(value, (2, -1))
+        worst = int(np.argmax(np.abs(gains) + np.abs(zeros)))
+        rest = f"{'plus' if zeros[worst] >= 0 else 'minus'} {100 * abs(zeros[worst]):.2g} % of the usual tension"
+        return f"that of cables[{worst}] reads {1 + gains[worst]:.3g} times the tension {rest}"
     if name in FACTORS:
         return f"{value:.4g} times the file's"
     return quantity(1e3 * value, "ms", 3) if name == "delay" else quantity(value, "N", 3)
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def _share(one: Explanation) -> str:

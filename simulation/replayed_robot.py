@@ -3,6 +3,7 @@
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ..models.robot import Robot
 
@@ -17,6 +18,10 @@ class Parameters(NamedTuple):
     # mass of the platform and stiffness of the cables, as factors of the file's
     mass: float = 1.0
     stiffness: float = 1.0
+    tilt: tuple[float, ...] = (0.0, 0.0)  # rotation of gravity about x and y of {G} [rad]
+    # of load cells, (2 m,): gains minus 1, and readings without tension over the usual tension
+    load_cells: tuple[float, ...] = ()
+    cable_friction: tuple[float, ...] = ()  # dry friction of each cable beyond `friction`, (m,) [N]
 
 
 def modelled(robot: Robot, drive: str, flown: np.ndarray) -> Robot:
@@ -47,11 +52,12 @@ def friction_of(robot: Robot) -> float:
 def changed(robot: Robot, to: Parameters) -> Robot:
     """Return a robot with other parameters; its geometry and cables without stiffness or winch stay."""
     more, cables = to.friction - friction_of(robot), []
-    for cable in robot.cables:
+    for cable, own in zip(robot.cables, to.cable_friction or robot.m * (0.0,), strict=True):
         changes: dict[str, Any] = {"stiffness": cable.stiffness and cable.stiffness * to.stiffness}
         if cable.winch is not None:
-            winch = cable.winch.model_copy(update={"friction": max(cable.winch.friction + more, 0.0)})
+            winch = cable.winch.model_copy(update={"friction": max(cable.winch.friction + more + own, 0.0)})
             changes["winch"] = winch
         cables.append(cable.model_copy(update=changes))
     platform = robot.platform.model_copy(update={"mass": robot.platform.mass * to.mass})
-    return robot.model_copy(update={"cables": tuple(cables), "platform": platform})
+    gravity = Rotation.from_rotvec([*to.tilt, 0.0]).apply(robot.gravity) if any(to.tilt) else robot.gravity
+    return robot.model_copy(update={"cables": tuple(cables), "platform": platform, "gravity": tuple(gravity)})

@@ -61,7 +61,11 @@ class Windows:
             self.notes.append("cables without a stiffness in the file are given one: 0.1 % of elongation at t_max")
         if self.drive == "lengths" and recorded.tensions is None and robot.fixed_lengths is None:
             self.notes.append("lengths do not show friction of the winches: record tensions or motor currents for that")
-        self.usual = Parameters(friction=friction_of(self.robot))  # parameters of the file
+        m = robot.m  # parameters of the file
+        self.usual = Parameters(friction=friction_of(self.robot), load_cells=2 * m * (0.0,), cable_friction=m * (0.0,))
+        self.usual_tension = self.robot.force_scale
+        if recorded.tensions is not None:
+            self.usual_tension = float(np.median(np.abs(recorded.tensions)))
         self._known = np.asarray(np.isfinite(recorded.pose).all(axis=1))
         if self._known.sum() < FEWEST:
             raise InputError(f"log must have a pose at {FEWEST} times or more, got {int(self._known.sum())}")
@@ -237,15 +241,23 @@ class Windows:
         quaternion = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(scalar_first=True).reshape(*R.shape[:2], 4)
         return np.concatenate([quaternion, np.pad(rate, ((0, 0), (0, 1), (0, 0)), mode="edge")], axis=-1)
 
-    def _tensions_at_start(self, mass: float) -> np.ndarray:
+    def _tensions_at_start(self, with_: Parameters) -> np.ndarray:
         """Return recorded tensions (W, m) [N], or those nearest to a tenth of their range that hold the platform."""
         if self._pull is not None:
-            return self._pull
+            gains, zeros = self._cells(with_)
+            return ((self._pull - zeros) / gains).clip(0.0)
         robot, (A, wrench) = self.robot, self._balance
         usual = np.minimum(robot.t_min + 0.1 * (robot.t_max - robot.t_min), 2 * robot.force_scale)
         scale = robot.wrench_scale * (robot.dof_mask > 0)
-        missing = scale * (wrench * np.repeat([mass, 1.0], 3) - A @ usual)
+        missing = scale * (wrench * np.repeat([with_.mass, 1.0], 3) - A @ usual)
+        turned = np.array(changed(robot, with_).gravity) - robot.gravity
+        missing[..., :3] -= scale[:3] * with_.mass * robot.platform.mass * turned
         return (usual + (np.linalg.pinv(scale[:, None] * A, rcond=1e-6) @ missing[..., None])[..., 0]).clip(0.0)
+
+    def _cells(self, with_: Parameters) -> np.ndarray:
+        """Return readings per newton and readings without tension of the load cells, (2, m)."""
+        gains, zeros = np.reshape(with_.load_cells, (2, -1))
+        return np.array([1 + gains, zeros * self.usual_tension])
 
     def _states(self, plant: Plant, pulls: np.ndarray, shift: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return states (V W, n) and unstrained lengths (V, W, m), for corrections (V, W, P) and tensions (W, m)."""
@@ -287,7 +299,7 @@ class Windows:
         by = np.diag(self._steps_of_start) if nudged else np.zeros((0, len(self.start_sigma)))
         shift = self.start + np.concatenate([np.zeros((1, 1, by.shape[1])), by[:, None]])  # (V, W, P)
         count = len(shift)
-        states, own = self._states(plant, self._tensions_at_start(with_.mass), shift)
+        states, own = self._states(plant, self._tensions_at_start(with_), shift)
         rows, cables = self._commands(plant, with_, own)
         out = np.zeros((count, *self.rows.shape, 7 + 2 * m))
         at = (self.recorded.times[self.rows] - self.starts[:, None]) / dt
@@ -311,7 +323,8 @@ class Windows:
                     out[:, w, s] = _seen(plant, *((1 - share) * one[:, :, 0] + share * one[:, :, 1] for one in ends))
                 states[:] = history[:, 1]
         speeds = np.take_along_axis(self._cable_speed, number[..., None], axis=1)  # (W, S, m)
-        residuals = self._residuals(out, plant, with_.friction * np.tanh(speeds / SLOW))
+        friction = (with_.friction + np.array(with_.cable_friction)) * np.tanh(speeds / SLOW)
+        residuals = self._residuals(out, plant, friction, with_)
         residuals[1:] = (residuals[1:] - residuals[0]) / self._steps_of_start[:, None, None] if nudged else 0.0
         return residuals
 
@@ -322,9 +335,12 @@ class Windows:
             along = self._signal(self._grid - with_.delay)  # (W, K + 1, m)
             cables = np.maximum(own[:, :, None] + along[:, 1:] - along[:, :1], layout.SHORTEST)
         else:
-            pulls = self._signal(middle[:, :-1])
+            pulls, friction = self._signal(middle[:, :-1]), with_.friction + np.array(with_.cable_friction)
+            if self.measured_command:
+                gains, zeros = self._cells(with_)
+                pulls = (pulls - zeros) / gains
             if self.drive == "tensions":
-                pulls = (pulls + with_.friction * np.tanh(self._cable_speed[:, :-1] / SLOW)).clip(0.0)
+                pulls = (pulls + friction * np.tanh(self._cable_speed[:, :-1] / SLOW)).clip(0.0)
             cables = np.broadcast_to(pulls, (len(own), *pulls.shape))
         actuators = max(len(carrier.actuators) for carrier in self.robot.carriers)
         actuation = np.zeros((*self._grid.shape, len(self.robot.carriers), actuators))
@@ -332,7 +348,7 @@ class Windows:
             actuation[:, :, index, 0] = np.interp(middle, self.recorded.times, self.recorded.thrusts[:, index])
         return plant.command(np.ones(self.robot.m), actuation, *self._carried), cables
 
-    def _residuals(self, out: np.ndarray, plant: Plant, friction: np.ndarray) -> np.ndarray:
+    def _residuals(self, out: np.ndarray, plant: Plant, friction: np.ndarray, with_: Parameters) -> np.ndarray:
         """Return measured minus simulated over noise, (V, W, R), from what `_seen` returns, (V, W, S, 7 + 2 m).
 
         Winches that follow lengths overcome their friction (W, S, m) [N]: it shows only in tensions that are measured
@@ -350,7 +366,8 @@ class Windows:
             parts["rotation"] = np.where(moves, away.as_rotvec().reshape(position.shape), 0.0)
         if "tensions" in self.noise and of.tensions is not None:
             behind = (tensions - friction).clip(0.0) if self.drive == "lengths" else tensions
-            parts["tensions"] = np.where(inside, of.tensions[rows] - behind, 0.0)
+            gains, zeros = self._cells(with_)
+            parts["tensions"] = np.where(inside, of.tensions[rows] - (gains * behind + zeros), 0.0)
         if "lengths" in self.noise and of.lengths is not None:
             stretches = not (self.drive == "tensions" and self.assumed)
             stretch = 1 + stretches * tensions / plant.record["cable"]["stiffness"][: self.robot.m]

@@ -176,6 +176,27 @@ def test_what_is_wrong_is_named_first(kind, name, robot, options, truth, logs):
     assert name in result.report().splitlines()[0]
 
 
+@pytest.mark.parametrize(("gain", "zero"), [(1.2, 0.0), (1.0, 10.0)])
+def test_a_wrong_load_cell_is_neither_mass_nor_stiffness(gain, zero, tmp_path):
+    found = columns("lengths", every("lengths"))
+    found["tension_1 [N]"] = gain * found["tension_1 [N]"] + zero
+    result = replay(PLANAR, written(tmp_path / "log.csv", found), fit=gain > 1)
+    assert result.named == ["load_cells"]
+    gains, zeros = np.reshape(result.found[0].value, (2, -1))
+    sigmas = np.reshape(result.found[0].sigma, (2, -1))
+    np.testing.assert_array_less(np.abs(gains - [0, gain - 1, 0, 0]), 4 * sigmas[0] + 1e-3)
+    np.testing.assert_array_less(np.abs(zeros * result.windows.usual_tension - [0, zero, 0, 0]), 1.5)
+    assert "load cells explain over 99 % of the residuals: that of cables[1] reads" in result.report()
+    assert result.refused  # a wrong mass, or that no fit was asked for
+
+
+def test_a_frame_that_is_not_level(logs):
+    turned = PLANAR.model_copy(update={"gravity": (9.81 * np.sin(0.05), 0.0, -9.81 * np.cos(0.05))})
+    result = replay(turned, logs["lengths"])
+    assert result.named == ["tilt"]
+    assert result.found[0].value[1] == pytest.approx(0.05, abs=4 * result.found[0].sigma[1])
+
+
 def test_a_winch_that_slips_is_in_the_summary(tmp_path):
     """Its windows are outliers, and the summary was that the model reproduces the recording."""
     found = columns("lengths", every("lengths"))

@@ -124,7 +124,7 @@ _WORDS |= {"deg": "deg|degrees?|°", "rad": "rad|radians?", "m": "m|met(?:er|re)
 _SUFFIX = re.compile(rf"(.+?)\s*(?:[_ ]|\()({'|'.join(_WORDS.values())})\)?")
 
 
-ANGLE_OF = dict(zip("xyz012", 2 * ("roll", "pitch", "yaw"), strict=True))
+ANGLE_OF: dict[str, str] = dict(zip("xyz012", 2 * ("roll", "pitch", "yaw"), strict=True))
 ANGLE_OF |= {"phi": "roll", "theta": "pitch", "psi": "yaw", "heading": "yaw"}
 
 
