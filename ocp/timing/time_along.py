@@ -154,22 +154,19 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
 
 
 def _through(s: np.ndarray, corners: np.ndarray, rises: np.ndarray) -> np.ndarray:
-    """Return a grid with further points where the bound of the speed rises, and its nearest inner points at corners.
+    """Return a grid with further points at corners of the bound of the speed and where that rises.
 
     A law that is slow enough at the first point in a zone would be too fast between its edge and that point.
     """
     least = CLOSEST * (s[-1] - s[0]) / len(s)
-    further = np.sort(rises[(rises > s[0]) & (rises < s[-1])])
-    after = np.searchsorted(s, further)
-    apart = np.minimum(further - s[after - 1], s[after] - further) > least
-    s = np.sort(np.append(s, further[apart & (np.diff(further, prepend=-np.inf) > least)]))
-    moved, left = s.copy(), np.arange(1, len(s) - 1)
-    corners = np.sort(corners)
-    apart = (np.diff(corners, prepend=-np.inf) > least) & (corners > s[0] + least) & (corners < s[-1] - least)
-    for corner in corners[apart][: left.size]:
-        nearest = left[np.abs(s[left] - corner).argmin()]
-        moved[nearest], left = corner, left[left != nearest]
-    return np.sort(moved)
+    points = s[[0, -1]]
+    for further, smallest in ((corners, least), (s[1:-1], 0.0), (rises, least)):
+        inside = np.sort(further[(further > s[0]) & (further < s[-1])])
+        inside = inside[np.diff(inside, prepend=-np.inf) > smallest]
+        after = np.searchsorted(points, inside)
+        apart = np.minimum(inside - points[after - 1], points[after] - inside) > least
+        points = np.sort(np.append(points, inside[apart]))
+    return points
 
 
 def _timed(task: Task, law: FastestLaw) -> Task:
