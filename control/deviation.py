@@ -6,10 +6,11 @@ from ..models.points import rotations
 from ..models.robot import Robot
 from .command import OFF, PLANNED, SHIFTED
 
-FAR, MOST = 0.1, 0.5  # position: of the mean length of the cables at home, and at most [m]
+FAR, MOST = 0.05, 0.05  # position: of the mean length of the cables at home, and at most [m]
 TURNED = 0.5  # [rad], of the rotation between the two
-OFF_TARGET = 0.2  # of these: an error with which predictions may end
+END, END_MOST, END_TURNED = 0.02, 0.1, 0.1  # the same of errors with which predictions may end
 LEFT = 0.5  # of larger ones, how much they may leave
+END_FAR = 5.0  # times these: errors that nobody expects to end within a prediction
 
 
 class Deviation:
@@ -19,8 +20,9 @@ class Deviation:
     """
 
     def __init__(self, robot: Robot):
-        lengths = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1)
-        self.most = min(FAR * float(lengths.mean()), MOST), TURNED  # [m, rad]
+        length = float(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean())
+        self.most = min(FAR * length, MOST), TURNED  # [m, rad]
+        self._end = np.repeat([min(END * length, END_MOST), END_TURNED], 3)
 
     def are_far(self, poses: np.ndarray, wanted: np.ndarray, between: np.ndarray | None = None) -> np.ndarray:
         """Return which poses (..., 6) are away from their references (..., 6).
@@ -38,11 +40,11 @@ class Deviation:
     def stays(self, errors: np.ndarray) -> bool:
         """Return whether predicted errors, (K, 6) [m, rad], do not decrease, or will be more than negligible.
 
-        Errors that are reported in any case do not count.
+        Very large errors, which are reported in any case, do not count.
         """
-        first, last = np.linalg.norm(errors[[0, -1]] / np.repeat(self.most, 3), axis=1)
-        most = LEFT * first if first > OFF_TARGET else OFF_TARGET
-        return bool(last > most and not self.are_far(errors[0], np.zeros(6)))
+        first, last = np.linalg.norm(errors[[0, -1]] / self._end, axis=1)
+        most = LEFT * first if first > 1 else 1.0
+        return bool(last > most and first <= END_FAR)
 
     def status(self, answered: np.ndarray, poses: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """Return the status of each platform, (N,), from that of its tensions; poses and references are (N, 6)."""

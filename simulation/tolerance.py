@@ -3,10 +3,9 @@
 import numpy as np
 
 from ..base.inputs import number
+from ..control.deviation import FAR, MOST
 from ..models import Robot
 from ..models.dynamics import dynamics_of
-
-MOST, SHARE = 0.05, 0.05  # [m], and of the mean cable length at home
 
 
 def tolerance_of(robot: Robot, given: float | None) -> float:
@@ -16,4 +15,4 @@ def tolerance_of(robot: Robot, given: float | None) -> float:
     """
     if given is not None:
         return number("tolerance", given, 0.0, 1e6)
-    return min(MOST, SHARE * float(np.mean(dynamics_of(robot).cable_lengths(robot.home))))
+    return min(MOST, FAR * float(np.mean(dynamics_of(robot).cable_lengths(robot.home))))
