@@ -20,7 +20,7 @@ RANGES = {
 }
 ALONE = ("delay", "friction", "mass", "stiffness")  # parameters of one number, which a fit may write
 STEPS, HALVINGS = 4, 3  # of Gauss and Newton, and of a step that is too long
-LEAST = 0.5, 0.2  # share that a parameter of several numbers, or of one, must explain to be named
+LEAST = 0.5, 0.1  # share that a parameter of several numbers, or of one, must explain to be named
 REMOVED = 0.01  # of the sum of squares, from which on a parameter is named
 NOTHING = 0.5  # of the sum of squares that noise has: less needs no explanation
 DOUBT = 5e-4  # probability, on each side, that a parameter is named which only the scatter of the windows changes

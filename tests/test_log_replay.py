@@ -5,6 +5,7 @@ Recordings are made by `simulate` and the plant at 1 kHz, sampled and given nois
 
 import json
 from functools import cache
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -57,7 +58,10 @@ def motion(kind):
         "tensions": (load("planar-4"), None, swing((0, 0, 0.75), (0.2, 0, 0.12), (0.5, 1, 0.8))),
         "forces": (COGIRO, None, swing((0, 0, 1.5), (1.5, 1, 0.4), (0.25, 0.3, 0.4))),
     }[kind]
-    return robot, simulate(robot, path, controller).trajectory
+    with patch(
+        "towline.simulation.command_conversion.winch_forces"
+    ):  # motors that pull as commanded, and compensate nothing
+        return robot, simulate(robot, path, controller).trajectory
 
 
 def columns(kind, rows, seed=0):
