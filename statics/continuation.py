@@ -9,6 +9,7 @@ from ..models.trajectory import Motion, Trajectory
 RESTS = 1e-4  # [m/s, rad/s], at the end of a plan
 FADED = 1.0  # [s] after the end of a plan, from when on its last accelerations no longer count
 SHORT = 1e-3  # [s], for differences
+JERK = 20.0  # times the last speed and acceleration, by the time in which they fade: larger jerks are those of noise
 # Of the share of this time: functions that begin with 1 as value, slope or curvature, and end with three zeros.
 FADES = [np.polynomial.Polynomial(row) for row in ([1, 0, 0, -10, 15, -6], [0, 1, 0, -6, 8, -3], [0, 0, 1, -3, 3, -1])]
 FADES[2] /= 2
@@ -27,6 +28,11 @@ def continued(trajectory: Trajectory, together: bool) -> Trajectory:
     if max(np.abs(motion[1][2]).max() for motion in last) < RESTS:
         return trajectory
     jerks = [slopes(motion[2])[1] for motion in last]
+    for jerk, motion in zip(jerks, last, strict=True):
+        for part in (slice(0, 3), slice(3, 6)):
+            speed, acceleration = (float(np.abs(motion[order][2][..., part]).max()) for order in (1, 2))
+            most = JERK / FADED * (acceleration + speed / FADED)
+            jerk[..., part] = np.clip(jerk[..., part], -most, most)
 
     def at(times: np.ndarray) -> tuple[Motion, Motion]:
         motions, after = trajectory.at(np.minimum(times, end)), np.maximum(times - end, 0.0)

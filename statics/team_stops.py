@@ -38,6 +38,7 @@ TINY, RANK = 1e-12, 1e-9  # of a matrix
 TILTS = 3  # times that positions are computed from tilts, which follow from accelerations
 LACKING = 0.01  # of the largest tension: a force that no actuator gives
 INSTANT = 1e-4  # [s], for differences of attitudes
+MOST_FADING = 4.0, 20.0  # [1/s, 1/s^2], of logarithms of tensions at the end of a plan: larger ones are noise
 SLACK = 1e-4  # of the largest tension: none is less after the end of a plan
 # Of s = t / duration, with three continuous derivatives, and with five, since anchors that turn need two more.
 RATE = np.polynomial.Polynomial([1, 0, 0, 0, -35, 84, -70, 20])
@@ -295,8 +296,9 @@ def _forces(
     A, tensions, missing = _of_plan(robot, trajectory, planned, carriers)
     if (beyond := after[:, None] > 0).any():
         last = _of_plan(robot, trajectory, *trajectory.at(before(trajectory.duration or 0.0)))
-        logarithms = slopes(np.log(np.maximum(last[1], SLACK * robot.t_max)))  # so that all tensions stay positive
-        tensions = np.where(beyond, np.exp(faded(logarithms, np.maximum(after, 0.0))[0]), tensions)
+        value, *rates = slopes(np.log(np.maximum(last[1], SLACK * robot.t_max)))  # so that all tensions stay positive
+        rates = [np.clip(rate, -most, most) for rate, most in zip(rates, MOST_FADING, strict=True)]
+        tensions = np.where(beyond, np.exp(faded((value, *rates), np.maximum(after, 0.0))[0]), tensions)
         missing = np.where(beyond, last[2][2:], missing)
     now = dynamics_of(robot).required_wrench(*platform, wind=trajectory.wind)
     wanted = scale * (now - (A @ tensions[..., None])[..., 0] - kept[:, None] * missing)[:, rows]
