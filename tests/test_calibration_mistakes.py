@@ -39,7 +39,7 @@ def seen(poses, frame=NONE, body=NONE):
 
 
 def mistakes(robot, poses, y):
-    """26 wrong logs by name: poses and readings."""
+    """28 wrong logs by name: poses and readings."""
     whole, scale = Rotation.from_euler("xyz", poses[:, 3:]), np.array([1e3] * 3 + [1] * 3)
     of, degrees = (
         (lambda R: np.hstack([poses[:, :3], points.angles(R.as_matrix())])),
@@ -80,6 +80,7 @@ def mistakes(robot, poses, y):
         "markers turned": (seen(poses, body=([0.1, 0.05, 0.2], body)), y),
         "sign of x": (poses * [-1, 1, 1, 1, 1, 1], y),
         "y and z exchanged": (poses[:, [0, 2, 1, 3, 4, 5]], y),
+        "angles of drums, degrees as radians": (degrees * poses, y / 0.06),
     }
 
 
@@ -121,6 +122,18 @@ def test_sound_logs_draw_no_remark():
             y[len(y) // 2 :, 0] += 0.05
         found = mistake(robot, Measurements(y, poses + draw.normal(0, 5e-4, poses.shape) * robot.dof_mask))
         assert found is None, (k, robot.name, found)
+
+
+@pytest.mark.parametrize("name", ["cogiro", "ipanema-1"])
+def test_angles_of_drums_in_another_frame(name):
+    robot, poses, y = a_log(name)
+    frame = ([1, 2, -0.5], Rotation.from_euler("zyx", [133, 5, 3], degrees=True))
+    found = mistake(robot, Measurements(y / 0.06, seen(poses, frame)))
+    assert found.text.startswith(
+        "the lengths look like multiples of 0.06 m, such as a drum's angles, and the poses seem"
+    )
+    np.testing.assert_allclose(found.corrected.lengths, y, rtol=1e-3)
+    np.testing.assert_allclose(found.corrected.poses[:, :3], poses[:, :3], atol=0.1)
 
 
 def test_two_mistakes_at_once():

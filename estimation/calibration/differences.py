@@ -26,7 +26,8 @@ AS_GIVEN = Interpretation("")
 class LogPart(NamedTuple):
     """Samples with measured poses: the parameters' table, positions, rotations, angles as logged, and readings.
 
-    `carriers` are the poses of moving ones, (N, c, 6), which are read in the same way, or None.
+    `carriers` are the poses of moving ones, (N, c, 6), which are read in the same way, or None. `counted` is True if
+    readings may be multiples of lengths, with another factor for each cable.
     """
 
     robot: Robot
@@ -37,6 +38,7 @@ class LogPart(NamedTuple):
     y: np.ndarray
     sigma: float
     carriers: np.ndarray | None = None
+    counted: bool = False
 
     def without(self, samples: np.ndarray) -> LogPart:
         """Return the log without some samples (N,) of bool."""

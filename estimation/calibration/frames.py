@@ -2,7 +2,8 @@
 
 A motion capture measures the pose X of some body in some frame; the file's pose is T X B with the pose T of its frame
 in {G} and the pose B of the platform frame in the body. Both are fitted to the cable lengths with the file's anchors
-and attachments, up to the offsets of the readings, from all turns of the axes by right angles.
+and attachments, up to the offsets (and, if these are counted, the scales) of the readings, from all turns of the axes
+by right angles.
 """
 
 from collections.abc import Sequence
@@ -147,7 +148,9 @@ def _placed(frames: Sequence[np.ndarray], position: np.ndarray, rotation: np.nda
 
 
 def _residuals(log: LogPart, frames: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Return lengths less readings up to offsets, (S, m N) [m], and the derivatives by shifts and turns, (S, m N, 12).
+    """Return lengths less readings up to offsets and scales of counted readings, (S, m N) [m].
+
+    The second result has the derivatives by shifts and turns, (S, m N, 12).
 
     - `frames`: t (S, 3), T (S, 3, 3), b and B.
     """
@@ -160,9 +163,14 @@ def _residuals(log: LogPart, frames: Sequence[np.ndarray]) -> tuple[np.ndarray, 
     # A turn of the measured frame is about its origin.
     about_frame = by_pose[..., 1, :] + np.cross((x - t[:, None])[:, None], by_pose[..., 0, :])
     J = np.concatenate([by_pose[..., 0, :], about_frame, own.reshape(*own.shape[:3], 6)], axis=3)  # (S, m, N, 12)
-    e = run.lengths.reshape(shape).swapaxes(0, 1) - log.y.T
+    e = run.lengths.reshape(shape).swapaxes(0, 1) - (0.0 if log.counted else log.y.T)
     unknown = ~np.isfinite(e + J.sum(axis=3))
     e[unknown], J[unknown] = 1e3, 0.0
     e -= np.median(e, axis=2, keepdims=True)
     J -= J.mean(axis=2, keepdims=True)
+    if log.counted:
+        y = log.y - log.y.mean(axis=0)
+        y /= np.maximum(np.linalg.norm(y, axis=0), 1e-300)
+        e -= np.einsum("smn,nm->sm", e, y)[..., None] * y.T
+        J -= np.einsum("smnk,nm->smk", J, y)[:, :, None] * y.T[..., None]
     return e.reshape(len(t), -1), J.reshape(len(t), -1, 12)

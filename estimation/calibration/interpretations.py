@@ -30,6 +30,11 @@ class Interpretation(NamedTuple):
     turned: Turned | None = None
     factor: float = 1.0  # factor of the readings
 
+    @property
+    def of_readings(self) -> bool:
+        """Return whether poses are as they were logged."""
+        return self.placed is Interpretation("").placed and self.turned is None
+
 
 def interpretations(turns: bool) -> list[Interpretation]:
     """Return the ways to read a log, the given one first; those of orientations if the platform `turns`."""

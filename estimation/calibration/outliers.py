@@ -6,7 +6,9 @@ distributed, and the largest of a sample marks the outlier (Baarda). A slip chan
 sample on. Cumulative sums test this additional parameter for every cable and sample at once.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +38,12 @@ VISIBLE = 0.5  # share of it that must be
 BLOCKS = 25  # of the record, of at least so many samples each, to see whether residuals are autocorrelated
 SHORTEST_BLOCK = 8
 UNBALANCED = 1 - 1e-7  # share of sound samples whose forces are in better balance than those that are left out
-BY_CHANCE = 0.3  # of which the ratio of variances may exceed 1 where residuals are independent
+BY_CHANCE = 2.0  # standard deviations by which the ratio of variances may exceed 1 where residuals are independent
+NEAR_LIMIT = 0.25  # of the largest size of a residual, in which the density of residuals near the limit is counted
+UNEQUAL = 1.5  # times the variance of the squares of normally distributed errors
+MOST_LOST = 0.5  # of E psi'
+MOST_LEVERAGE = 0.9  # of a block; with more, its residuals would be far too uncertain
+FORCES_BY_CHANCE = 0.1  # of which the noise of forces may differ from the stated one
 
 
 class Outlier(NamedTuple):
@@ -85,44 +92,74 @@ def _limit(sizes: np.ndarray, count: int, known: int) -> float:
     return float(limits[beyond[-1]]) if beyond.size else first
 
 
-def autocorrelation(model: Model, state: State, covariance: np.ndarray, rank: int, excess: float) -> float:
-    """Return the factor by which autocorrelation increases the variances of the parameters; at least 1.
+def autocorrelation(model: Model, state: State, inverse: np.ndarray, rank: int, excess: float) -> float:
+    """Return the factor by which errors that are autocorrelated or unequal increase the variances of the parameters.
 
-    With g_b the sum of J'e over block b of the record, the parameters have the covariance S^-1 (sum g_b g_b') S^-1 for
-    any correlation inside blocks, and excess^2 S^-1 for independent residuals. The result is the ratio of the two as a
-    mean over all directions, because single directions would need many more blocks.
+    With g_b = J_b'e_b over block b of the record, parameters have the covariance S^-1 (sum g_b g_b') S^-1 for any
+    errors inside blocks, and excess^2 S^-1 for independent equal ones. The result, at least 1, is the ratio of the two
+    as a mean over all directions, because single directions would need many more blocks. Parameters adapt to the errors
+    of a block by the leverage A = S^-1/2 S_b S^-1/2 with S_b = J_b'J_b, so residuals are divided by 1 - A, which gives
+    those without the block. For equal errors the sum is then too large by a known amount, which is subtracted.
     """
     count = len(model.measurements)
-    if count < BLOCKS * SHORTEST_BLOCK or not rank:
+    blocks = BLOCKS if count >= BLOCKS * SHORTEST_BLOCK else count
+    if not rank:
         return 1.0
-    edges = np.arange(BLOCKS) * count // BLOCKS
-    block = np.searchsorted(edges, np.arange(count), side="right") - 1  # of each sample
-    total = np.zeros((BLOCKS, len(covariance)))
+    block = np.arange(count) * blocks // count  # of each sample
+    S, g = np.zeros((blocks, *inverse.shape)), np.zeros((blocks, len(inverse)))
     for part in parts(model, state, equations_of(model, state)):
-        blocks = block[part.rows]
-        first = np.flatnonzero(np.diff(blocks, prepend=-1))  # sample of each block
-        of_samples = _of_samples(part)
-        for i, row in enumerate(part.residuals):
-            J, columns = part.without_poses(i)
-            of_samples[:, columns] += J * row[:, None]
-        total[blocks[first]] += np.add.reduceat(of_samples, first, axis=0)
-    # The sums add up to 0 in a minimum, which takes one of them away.
-    ratio = float(((total @ covariance) * total).sum()) / (rank * (1 - 1 / BLOCKS) * excess**2)
-    return ratio if ratio > 1 + BY_CHANCE else 1.0
+        of_samples, first = block[part.rows], int(block[part.rows][0])
+        edges = np.searchsorted(of_samples, np.arange(first, of_samples[-1] + 2))
+        for J, e, columns in _equations(part):
+            for b, (begin, end) in enumerate(pairwise(edges), first):
+                rows = J[begin:end].reshape(-1, len(columns))
+                S[b][np.ix_(columns, columns)] += rows.T @ rows
+                g[b, columns] += rows.T @ e[begin:end].ravel()
+    values, vectors = np.linalg.eigh(inverse)
+    root = vectors[:, -rank:] * np.sqrt(np.maximum(values[-rank:], 0.0))
+    leverage, axes = np.linalg.eigh(root.T @ S @ root)  # (blocks, rank)
+    leverage = np.clip(leverage, 0.0, 1.0)
+    sizes = ((g @ root)[:, None] @ axes)[:, 0] ** 2 / excess**2
+    factors = 1 / (1 - np.minimum(leverage, MOST_LEVERAGE))
+    usual = factors**2 * leverage * (1 - leverage)
+    equal = (factors * sizes).sum() / max(leverage.sum(), 1e-300)  # variance, if it is the same in all blocks
+    more = float((factors**2 * sizes - equal * (usual - leverage) - leverage).sum()) / rank
+    chance = 2 * float((usual**2).sum())  # variance of the sum, of normally distributed errors
+    unequal = float(((factors**2 * sizes - usual) ** 2).sum()) > UNEQUAL * chance
+    if model.weights.all() and not unequal:
+        return 1 + more if more > BY_CHANCE * np.sqrt(chance) / rank else 1.0
+    return (1 + max(more, 0.0)) * (1.0 if model.weights.all() else _by_left_out(model, state))
 
 
-def _of_samples(part: Part) -> np.ndarray:
-    """Return J'e of each sample's balance of forces and directions, minus the part of its pose, (n, p) [1/m]."""
+def _by_left_out(model: Model, state: State) -> float:
+    """Return the factor of the variances of parameters because a fit prefers to leave out readings that disagree.
+
+    An M-estimator has the variance E psi^2 / (E psi')^2 with psi(e) = e up to a limit c and 0 beyond, for which E psi'
+    is smaller by c times the density of errors at +-c. A sample that is left out in part loses one redundant equation.
+    """
+    size, redundancy, _ = _sizes(model, state)
+    near = np.sum(size.max(axis=0) > (1 - NEAR_LIMIT) * size.max()) if size.any() else 0
+    return float((1 - min(near / NEAR_LIMIT / max(float(redundancy[size > 0].sum()), 1.0), MOST_LOST)) ** -2)
+
+
+def _equations(part: Part) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Yield derivatives (n, k, p) without the part of the poses [1/m], residuals (n, k), and columns (p,) of each kind.
+
+    Kinds are the readings of each cable, the balance of forces, and the directions of each cable.
+    """
     model, scale, inverse_root, Y = part.model, part.scale, part.inverse_root, part.Y
     varies, forces, seen = model.parameters.varies, part.derivatives.balance, part.derivatives.directions
-    total = np.zeros((len(model.measurements), int(varies.sum())))
+    for i, e in enumerate(part.residuals):
+        J, columns = part.without_poses(i)
+        yield J[:, None], e[:, None], columns
+    every = np.arange(int(varies.sum()))
     if forces is not None and forces.by_parameters is not None and forces.by_pose is not None:
         H = forces.by_parameters[..., varies] / scale[varies]
         if inverse_root is not None and Y is not None:
             H = H - forces.by_pose * model.poses_vary[:, None] @ np.swapaxes(inverse_root, 1, 2) @ Y
-        total += np.einsum("nip,ni->np", H, forces.residuals)
+        yield H, forces.residuals, every
     if seen is None or seen.cables is None or seen.clock is None or seen.poses is None:
-        return total
+        return
     clock = model.parameters.clock
     for i, e in enumerate(seen.residuals):
         J = np.zeros((*e.shape, model.parameters.count))
@@ -131,8 +168,7 @@ def _of_samples(part: Part) -> np.ndarray:
         if inverse_root is not None and Y is not None:
             root = (seen.poses[i] * model.poses_vary[:, None, :6]) @ np.swapaxes(inverse_root[:, :, :6], 1, 2)
             J = J - root @ Y
-        total += np.einsum("nkp,nk->np", J, e)
-    return total
+        yield J, e, every
 
 
 def find_unbalanced(model: Model, state: State) -> tuple[float, np.ndarray] | None:
@@ -160,27 +196,32 @@ def find_unbalanced(model: Model, state: State) -> tuple[float, np.ndarray] | No
 
     usual, most = (2 * gammaincinv(np.maximum(spare, SMALLEST_REDUNDANCY) / 2, share) for share in (0.5, UNBALANCED))
     noise = float(np.median(squares[tested] / usual[tested]))
-    certain = BY_CHANCE / 3 + 3 / np.sqrt(2 * float(spare[tested].sum()))
+    certain = FORCES_BY_CHANCE + 3 / np.sqrt(2 * float(spare[tested].sum()))
     factor = np.sqrt(noise) if abs(np.log(max(noise, 1e-12))) > certain else 1.0
     return float(factor), tested & (squares > max(noise, 1e-12) * most)
 
 
-def find_outliers(model: Model, state: State) -> tuple[list[Outlier], np.ndarray]:
-    """Return outliers, at most one per sample, and the readings to leave out because of them, (m, N) of bool."""
+def _sizes(model: Model, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return sizes of residuals in standard deviations, 0 where unseen, redundancies and residuals, (m, N) each."""
     found = project(model, state)
-    if (
-        len(state.shift) <= MOST_LEVERAGED and model.parameters.varies.any()
-    ):  # parameters, too, adapt to a wrong reading
+    if len(state.shift) <= MOST_LEVERAGED and model.parameters.varies.any():
+        # Parameters, too, adapt to a wrong reading.
         inverse = _inverse(model, state, found.equations, length_of(model.robot))
         for part in parts(model, state, found.equations):
             for i in range(model.robot.m):
                 rows, columns = part.without_poses(i)
                 found.redundancy[i, part.rows] -= quadratic_forms(rows, inverse[np.ix_(columns, columns)])
-    seen, left = found.redundancy > SMALLEST_REDUNDANCY, np.zeros(found.residuals.shape, dtype=bool)
+    seen, size = found.redundancy > SMALLEST_REDUNDANCY, np.zeros_like(found.residuals)
+    size[seen] = np.abs(found.residuals[seen]) / np.sqrt(found.redundancy[seen])
+    return size, found.redundancy, found.residuals
+
+
+def find_outliers(model: Model, state: State) -> tuple[list[Outlier], np.ndarray]:
+    """Return outliers, at most one per sample, and the readings to leave out because of them, (m, N) of bool."""
+    size, redundancy, residuals = _sizes(model, state)
+    seen, left = size > 0, np.zeros(size.shape, dtype=bool)
     if not seen.any():
         return [], left
-    size = np.zeros_like(found.residuals)
-    size[seen] = np.abs(found.residuals[seen]) / np.sqrt(found.redundancy[seen])
     worst = np.argmax(size, axis=0)
     samples = np.arange(size.shape[1])
     known = int((~model.weights).any(axis=0).sum())
@@ -193,7 +234,7 @@ def find_outliers(model: Model, state: State) -> tuple[list[Outlier], np.ndarray
     sigma = model.measurements.sigma.lengths
     left[worst[wrong], wrong] = True
     return [
-        Outlier(int(i), int(k), float(-sigma * found.residuals[i, k] / found.redundancy[i, k]))
+        Outlier(int(i), int(k), float(-sigma * residuals[i, k] / redundancy[i, k]))
         for i, k in zip(worst[wrong], wrong, strict=True)
     ], left
 

@@ -25,7 +25,7 @@ from ...models.files import as_robot
 from ...models.robot import Robot
 from ..logs.measurements import Measurements, changed, check_measurements, measured_poses, tracked
 from .attitudes import misread_attitudes
-from .differences import FEWEST, LogPart, medians
+from .differences import AS_GIVEN, FEWEST, LogPart, medians
 from .frames import Frames, displaced_frames, fitted_frames
 from .geometry import length_of
 from .interpretations import FACTORS, Interpretation, interpretations
@@ -41,6 +41,7 @@ HOPELESS = 2.0  # a convention is rejected if the roughness is so many times lar
 LARGEST = 10.0  # times the cables' mean length, of a change of readings
 MANY_CABLES = 6  # of fewer cables, frames explain what wrong anchors do
 DISPLACED = 3.0  # times smaller differences, by a frame near the file's
+LAST_STEP = 3  # of fits of frames: to readings as they are, up to scales, and twice with these scales
 FAR = 3.0  # times the noise, of differences that are not explained yet
 OTHER_FACTOR, SAME_FACTOR = 0.1, 0.01  # from 1, and from those of units
 
@@ -115,13 +116,24 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     named = best.weighted < as_given and best.size < EXPLAINED * change
     far = best.size * best.way.factor > FAR * noise if named else as_given > EXPLAINED * change
     if far and framed and len(log.y) >= FEWEST[1]:
-        frames = fitted_frames(log)
-        moved = frames.of(position, rotation)
-        placed = frames.of(log.position, log.rotation)
-        there, left = log._replace(position=placed[0], rotation=placed[1]).sound()
-        size = _rms(medians(left, len(there.y)))
-        if VERY_CLEARLY * size < min(as_given, best.size) and size < EXPLAINED * change:
-            return Mistake(_in_frame(frames._replace(size=size), as_given), _corrected(given, *moved, None, order, 1.0))
+        part = log
+        for step in range(LAST_STEP + 1):
+            frames = fitted_frames(part._replace(counted=step == 1))
+            moved = frames.of(position, rotation)
+            placed = frames.of(log.position, log.rotation)
+            there, left = log._replace(position=placed[0], rotation=placed[1]).sound()
+            size = _rms(medians(left, len(there.y)))
+            way = _Way(VERY_CLEARLY * size, size, "", AS_GIVEN, order, np.ones(robot.m))
+            if step:
+                ways = (one for one in _explanations(there, left[:, : len(there.y)], noise)[0] if one.way.of_readings)
+                way = min(ways, default=way, key=lambda one: one.weighted)
+            left_before, factors = min(as_given, best.size * best.way.factor), way.signs * way.way.factor
+            if step and step < LAST_STEP:  # with scales that are known, the frames are found more exactly
+                part = log._replace(y=log.y[:, way.columns] * factors)
+            elif way.weighted * way.way.factor < left_before and way.size < EXPLAINED * change:
+                text = _in_frame(frames._replace(size=way.size), as_given)
+                text = f"{way.text}, and {text}" if way.text else text
+                return Mistake(text, _corrected(given, *moved, None, way.columns, factors), factors=factors)
     if named:
         whole = log._replace(position=position, rotation=rotation, angles=angles, carriers=carriers)
         factors = best.signs * best.way.factor
@@ -205,7 +217,8 @@ def _explanations(log: LogPart, e: np.ndarray, noise: float) -> tuple[list[_Way]
             size = _rms(best[order, columns])
             weighted = VERY_CLEARLY * least * (min(size, gain * as_given) if not way.text else size)
             ways.append(_Way(weighted, size, text, way, columns, signs))
-    ways += _multiples(*base, len(log.y))
+        if way.factor == 1.0:
+            ways += _multiples(lengths, y, len(log.y), way)
     likeliest = _likeliest(e, turns)
     if likeliest is not None:
         # Errors that are no noise may seem smaller in another convention by chance.
@@ -214,10 +227,10 @@ def _explanations(log: LogPart, e: np.ndarray, noise: float) -> tuple[list[_Way]
     return ways, as_given
 
 
-def _multiples(lengths: np.ndarray, y: np.ndarray, count: int) -> list[_Way]:
+def _multiples(lengths: np.ndarray, y: np.ndarray, count: int, way: Interpretation = AS_GIVEN) -> list[_Way]:
     """Return the explanation that readings count something whose size is another one for each cable, or nothing.
 
-    - `lengths`, `y`: as `LogPart.parts` returns them for `count` samples.
+    - `lengths`, `y`: as `LogPart.parts` returns them for `count` samples, read in a `way`.
     """
     from scipy.optimize import linear_sum_assignment
 
@@ -238,10 +251,11 @@ def _multiples(lengths: np.ndarray, y: np.ndarray, count: int) -> list[_Way]:
     listed = [unit] if similar else sizes.tolist()
     text = f"the lengths look like multiples of {', '.join(quantity(one, 'm', 3) for one in listed)}"
     text = _and(f"{text}, such as a drum's angles", columns, factors)
+    text = f"{text}, and {way.text}" if way.text else text
     simple = similar and (columns == order).all() and (factors > 0).all()
     size = _rms(apart[order, columns]) / unit
-    weight = VERY_CLEARLY * (1.0 if simple else VERY_CLEARLY)
-    return [_Way(weight * size, size, text, Interpretation(text, factor=unit), columns, factors / unit)]
+    weight = VERY_CLEARLY ** (1 + (not simple) + bool(way.text))
+    return [_Way(weight * size, size, text, way._replace(text=text, factor=unit), columns, factors / unit)]
 
 
 def _root_mean_square(e: np.ndarray) -> float:
