@@ -220,7 +220,7 @@ class Replay(Drawn, Reported, Displayed):
             return f"{text}; {self.windows.recorded.doubt}"
         if self.named:
             best = self.found[0]
-            verb = "explain" if best.name.endswith("s") and best.name != "stiffness" else "explains"
+            verb = "explain" if best.name == "load_cells" else "explains"
             text += f"; {' or '.join(map(_words, self.named))} {verb} {_share(best)} of the residuals: "
             text += _value(best.name, best.value)
             after = self._rms(self.explained or {})

@@ -177,7 +177,7 @@ def test_what_is_wrong_is_named_first(kind, name, robot, options, truth, logs):
     after = result.explained
     assert after is not None
     assert result._rms(after)["position"] < result.rms()["position"] * 1.05
-    assert name in result.report().splitlines()[0]
+    assert f"{name} explains" in result.report().splitlines()[0]
 
 
 @pytest.mark.parametrize(("gain", "zero"), [(1.2, 0.0), (1.0, 10.0)])
