@@ -8,9 +8,9 @@ from .command import OFF, PLANNED, SHIFTED
 
 FAR, MOST = 0.05, 0.05  # position: of the mean length of the cables at home, and at most [m]
 TURNED = 0.5  # [rad], of the rotation between the two
-END, END_MOST, END_TURNED = 0.02, 0.1, 0.1  # the same of errors with which predictions may end
-LEFT = 0.5  # of larger ones, how much they may leave
-END_FAR = 5.0  # times these: errors that nobody expects to end within a prediction
+END, END_MOST, END_TURNED = 0.02, 0.1, 0.1  # the same for errors at the end of a prediction
+LEFT = 0.5  # share of a larger error that a prediction may leave
+END_FAR = 5.0  # times these: errors that are too large to decay within a prediction
 
 
 class Deviation:

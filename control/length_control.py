@@ -37,18 +37,17 @@ class LengthControl(Controller):
 
     where s are the strains at which cables with the stiffness EA and the file's damping have the planned tensions, x is
     the planned pose, J the Jacobian of the lengths, and e the error of the measured pose, whose rotation is a vector in
-    {G}, so that no attitude is special. x and the tensions are those planned for the time at which the winches will
-    have followed, x also for the end of the period. The tensions of a robot with more cables than degrees of freedom
-    follow from the lengths; they are not controlled. With a lag, e and its integral are extrapolated to that time, to
-    first order.
+    {G}, so that no attitude is special. The tensions are those planned for the time at which the winches will have
+    followed, x for the end of the period after it. Tensions of a robot with more cables than degrees of freedom follow
+    from the lengths; they are not controlled. With a lag, e and its integral are extrapolated to first order.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file. Its carriers must not fly.
         stiffness: E A [N], a number or one for each cable, instead of the file's values; infinity for a cable that does
             not stretch (also the default of a cable without a value in the file, if there are no more cables than
             degrees of freedom).
-        damping: C [N s/m], a number or one for each cable, instead of the file's values; 2 ms times the stiffness is
-            assumed for a cable without stiffness in the file.
+        damping: C [N s/m], a number or one for each cable, instead of the file's values; 2 ms times `stiffness`
+            is assumed for a cable without stiffness in the file.
         lag: Time constant with which the winches follow their commands [s]: lengths are commanded earlier by this time,
             and their corrections with as much lead.
         proportional, integral: P, and I [1/s]; 0 and 0 for lengths without correction. The default is the largest, up
@@ -163,8 +162,7 @@ class LengthControl(Controller):
     def _ahead(self, dt: float, reference: Reference) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the planned pose, poses of carriers and tensions at the time when the winches will have followed.
 
-        They reach a length at the end of a period, as those of `Plant` and drives that interpolate. Tensions are not
-        extrapolated to it, because they may jump.
+        Winches reach a length at the end of a period. Tensions are not extrapolated to it, because they may jump.
         """
         lag, tensions = self._lag, reference.tensions
         (pose, *_), (carriers, *_) = (moved_on(part, lag + (dt or PERIOD)) for part in (reference[:3], reference[3:6]))

@@ -6,8 +6,8 @@ from .as_floats import ROUNDING
 
 GAINS = "kd", "kp", "ki"  # of the settings, in the order of the powers of the bandwidth
 LOOPS = "attitude", "place", "carrier_bandwidth", "observer"  # the other bandwidths of the settings
-# Over the bandwidth of the error, and of carriers: the longest time between steps; from 1 on a loop is unstable (Jury).
-# Errors have an observer, tensions that are wrong, and a geometry that changes meanwhile.
+# Longest time between steps, times the bandwidth of the error and of carriers; from 1 on a loop is unstable (Jury).
+# The loop of the error also has an observer, tensions that differ from their commands, and a geometry that changes.
 HELD_FOR, INNER = 0.6, 0.75
 
 

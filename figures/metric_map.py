@@ -19,12 +19,12 @@ CELLS = 32  # along each axis, at most
 IN_A_CELL = 8  # samples that a cell should have: of half as many, some cells have none
 LAYERS = 3  # of a volume, along z
 LEVELS = 8
-FLAT = 0.4  # of its width: layers less high are drawn below one another
+FLAT = 0.4  # height over width of a layer: with less, layers are drawn below one another
 SHARE = 2.0  # [%] of the values below the lowest level, and above the highest one
 
 
 def metric_map(result: xr.Dataset, metrics: Sequence[str], anchors: np.ndarray | None = None) -> style.Figure:
-    """Draw contours of metrics: the mean of the samples in each cell of the positions, and next to it with less weight.
+    """Draw contours of metrics: means of samples in each cell of positions and, with less weight, in its neighbours.
 
     A region without extent along one axis has one panel, a volume three: the lower, middle and upper third of the
     heights of its samples. Along a line, the samples themselves are drawn.
@@ -94,7 +94,6 @@ def _contours(
     total, *_ = np.histogram2d(*position.T, bins=cells, weights=values)
     if not ((count[1:, 1:] > 0) & (count[:-1, :-1] > 0) & (count[1:, :-1] > 0) & (count[:-1, 1:] > 0)).any():
         return None
-    # Where a layer is thick, samples of one cell differ.
     near = gaussian_filter(count, SMOOTH)
     mean = np.ma.masked_array(gaussian_filter(total, SMOOTH) / np.where(count > 0, near, 1.0), count == 0).T
     centres = [(edges[1:] + edges[:-1]) / 2 for edges in cells]

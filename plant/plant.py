@@ -137,8 +137,8 @@ class Plant:
                 home, at rest.
             carrier_pose, carrier_velocity: The same for the carriers, (..., c, 6); velocities of fixed coordinates are
                 ignored.
-            tensions: Tensions at first, (..., m) [N], which determine the unstrained lengths of elastic cables and the
-                rates of winches with which they last.
+            tensions: Tensions at the start, (..., m) [N]. They determine the unstrained lengths of elastic cables, and
+                the speeds of winches, which keep these tensions.
             lengths: Unstrained lengths, (..., m) [m], instead of `tensions`; default: cables without tension at the
                 pose.
 
@@ -184,9 +184,9 @@ class Plant:
         return states
 
     def fixed_lengths(self, tensions: np.ndarray) -> np.ndarray | None:
-        """Return unstrained lengths, (..., m) [m], with which cables have the lengths that the robot's file fixes.
+        """Return unstrained lengths, (..., m) [m], of cables that have the file's fixed lengths under `tensions` [N].
 
-        They are under `tensions`, (..., m) [N]. None if the robot has winches, or the plant another drive.
+        None if the robot has winches, or the plant another drive.
         """
         if self.robot.fixed_lengths is None or self.drive != "lengths":
             return None

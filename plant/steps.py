@@ -11,8 +11,8 @@ from .plant import Plant
 
 ANGLE = 1.0  # what the fastest motion of the cables may turn or decay by in a step; Runge-Kutta is stable up to 2.8
 TIED = 2.0  # what a winch with a constant rate may add to the mass that its cable moves, of that mass
-DRIVE_PERIOD = 1e-3  # [s], at most, of drives that compute the forces of winches' motors from tensions
-HELD = 0.4  # [rad]: what the fastest motion of the cables may turn by while such forces are held
+DRIVE_PERIOD = 1e-3  # longest period of drives that compute motor forces from tensions [s]
+HELD = 0.4  # largest phase of the fastest motion of the cables in such a period [rad]
 
 
 def default_drive(robot: Robot) -> str:
@@ -53,7 +53,7 @@ def fastest_motion(plant: Plant) -> tuple[float, float]:
     """Return the highest frequency and decay of elastic cables at home [rad/s]; 0 if not all of them are elastic.
 
     With the elongations e of taut cables, d2e/dt2 = -G (K e + C de/dt), where G has the accelerations along the cables
-    that unit tensions cause, also those of winches whose motors are commanded forces; the largest eigenvalues of G K
+    that unit tensions cause, including those of winches with commanded forces; the largest eigenvalues of G K
     and G C bound frequency and decay.
     """
     cables = plant.record["cable"][: plant.robot.m]

@@ -18,8 +18,8 @@ FASTEST = 1e3  # [m/s], of the air
 class Orders:
     """Convert controller commands to plant commands for each drive type.
 
-    Drives of winches with forces are assumed to know their winch, and to compensate its friction and inertia as far as
-    the motor permits: core/plant/winch_forces.h. Elastic cables without winches in their file are assumed to have
+    Drives of winches with forces are assumed to compensate friction and inertia of their winch as far as the motor
+    permits: core/plant/winch_forces.h. Elastic cables without winches in their file are assumed to have
     winches that reach the tension: core/plant/winch_lengths.c. Both measure tensions and work within the period, or
     within each of its parts (`plant.steps.windings_in`). Carriers are commanded for one instant and move like the
     reference until the next.

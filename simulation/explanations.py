@@ -145,16 +145,14 @@ class Matching:
             if not np.trace(steep.sum(axis=0)) > 0:
                 break
             values, along_of = np.linalg.eigh(steep.sum(axis=0))
-            kept = values > least  # directions of several numbers that the recording does not show stay
+            kept = values > least  # not changed along directions that the recording does not show
             inverse = (along_of[:, kept] / values[kept]) @ along_of[:, kept].T
             change = -inverse @ along.sum(axis=0)
             # What as much noise again would change, also on average: simulated tensions end at zero.
             echo = np.einsum("iwr,wr->i", slope, self._echoed[used])
             scatter = np.vstack([along + steep @ change, echo]) @ inverse
             sigma = np.sqrt(np.sum(scatter**2, axis=0))
-            sigma[np.diagonal(inverse) * np.diagonal(steep.sum(axis=0)) < 0.5] = (
-                np.inf
-            )  # those that are left as they are
+            sigma[np.diagonal(inverse) * np.diagonal(steep.sum(axis=0)) < 0.5] = np.inf  # numbers that are kept
             trials = (np.clip(value + change / 2**i, low, high) for i in range(HALVINGS))
             matches = (self.at(_with(best.parameters, name, trial)) for trial in trials)
             better = next((one for one in matches if one.cost[used].sum() < best.cost[used].sum()), None)
@@ -203,7 +201,7 @@ def applicable(windows: Windows) -> Sequence[str]:
 
 
 def weight(one: Explanation) -> float:
-    """Return the share of an explanation, less if it has several numbers, which explain more than one number does."""
+    """Return the share of an explanation, reduced if it has several numbers, because these explain more anyway."""
     return one.explained * (1 - TIED * min(np.size(one.value) - 1, 2) / 2)
 
 

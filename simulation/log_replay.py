@@ -266,7 +266,7 @@ class Replay(Drawn, Reported, Displayed):
     def _explanation_table(self) -> Table:
         rows = []
         for one in self.found:
-            remark = "" if one.named else "no reduction" if one.shown else "not determined by this recording"
+            remark = "" if one.named else "no clear reduction" if one.shown else "not determined by this recording"
             if one.name in self.named[1:]:
                 remark = "not distinguishable from the first"
             if one.name not in ALONE:

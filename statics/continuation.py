@@ -7,10 +7,10 @@ import numpy as np
 from ..models.trajectory import Motion, Trajectory
 
 RESTS = 1e-4  # [m/s, rad/s], at the end of a plan
-FADED = 1.0  # [s] after the end of a plan, from when on its last accelerations no longer count
+FADED = 1.0  # time after the end of a plan in which its last accelerations fade [s]
 SHORT = 1e-3  # [s], for differences
-JERK = 20.0  # times the last speed and acceleration, by the time in which they fade: larger jerks are those of noise
-# Of the share of this time: functions that begin with 1 as value, slope or curvature, and end with three zeros.
+JERK = 20.0  # times the last acceleration and speed, divided by powers of FADED: larger jerks are noise
+# Functions on [0, 1] that begin with value, slope or curvature 1, and end with all three zero.
 FADES = [np.polynomial.Polynomial(row) for row in ([1, 0, 0, -10, 15, -6], [0, 1, 0, -6, 8, -3], [0, 0, 1, -3, 3, -1])]
 FADES[2] /= 2
 OF_ORDER = {order: [f.integ(order) if order >= 0 else f.deriv() for f in FADES] for order in range(-1, 3)}
@@ -60,17 +60,16 @@ def slopes(values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def faded(motion: Sequence[np.ndarray], after: np.ndarray, moves: np.ndarray | bool = False) -> Motion:
-    """Return values, rates and accelerations some times `after` a motion, (n,) [s], while its rates fade.
+    """Return values, rates and accelerations at times `after` the end of a motion, (n,) [s], while its rates fade.
 
-    The motion is values and two or three derivatives. Of coordinates that are to go on, in `moves`, only the
-    accelerations fade.
+    `motion` has values and two or three derivatives. Of the coordinates in `moves` only the accelerations fade.
     """
     values, rate, *others = motion
     after = after.reshape(-1, *[1] * (values.ndim - 1))
     share = np.minimum(after / FADED, 1.0)
 
     def fading(parts: Sequence[np.ndarray], order: int) -> np.ndarray:
-        """Return an integral of such an order, -1 to 2, of what begins with these derivatives."""
+        """Return the integral of order -1 to 2 of a function that fades from the derivatives `parts`."""
         those = zip(OF_ORDER[order], parts, strict=False)
         return np.asarray(sum(FADED ** (k + order) * f(share) * part for k, (f, part) in enumerate(those)))
 

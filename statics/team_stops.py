@@ -38,8 +38,8 @@ TINY, RANK = 1e-12, 1e-9  # of a matrix
 TILTS = 3  # times that positions are computed from tilts, which follow from accelerations
 LACKING = 0.01  # of the largest tension: a force that no actuator gives
 INSTANT = 1e-4  # [s], for differences of attitudes
-MOST_FADING = 4.0, 20.0  # [1/s, 1/s^2], of logarithms of tensions at the end of a plan: larger ones are noise
-SLACK = 1e-4  # of the largest tension: none is less after the end of a plan
+MOST_FADING = 4.0, 20.0  # derivatives of log(tension) at the end of a plan [1/s, 1/s^2]: larger ones are noise
+SLACK = 1e-4  # of the largest tension: smallest tension at the end of a plan
 # Of s = t / duration, with three continuous derivatives, and with five, since anchors that turn need two more.
 RATE = np.polynomial.Polynomial([1, 0, 0, 0, -35, 84, -70, 20])
 SMOOTHER = np.polynomial.Polynomial([1, 0, 0, 0, 0, 0, -462, 1980, -3465, 3080, -1386, 252])
@@ -288,8 +288,8 @@ def _forces(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the forces of the cables on the platform, (n, m, 3), the tensions, (n, m), and the plan's forces [N].
 
-    The imbalance of the plan is kept by the share `kept`, (n,), from 0 to 1. From some times `after` its end, (n,) [s],
-    the plan's tensions fade to constants; those that balance a motion of which no plan knows can be negative.
+    `kept`, (n,), is the share of the plan's imbalance that remains, and `after`, (n,) [s], the time after the plan's
+    end, from which its tensions fade to constants: those that balance an extrapolated motion can be negative.
     """
     rows = np.flatnonzero(robot.dof_mask)
     scale = robot.wrench_scale[rows]
@@ -317,7 +317,7 @@ def _forces(
 def _of_plan(
     robot: Robot, trajectory: Trajectory, planned: Motion, carriers: Motion
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return wrench matrices, (n, 6, m), the tensions that balance a plan best, (n, m), and what they miss, (n, 6)."""
+    """Return wrench matrices (n, 6, m), the tensions that balance a plan best, (n, m), and missing wrenches (n, 6)."""
     dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
     scale = robot.wrench_scale[rows]
     A = dynamics.wrench_matrix(planned[0], carriers[0])

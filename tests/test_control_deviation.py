@@ -72,7 +72,7 @@ def test_a_reference_that_jumps_is_reported_until_it_is_reached(make):
 
 
 def test_no_robot_is_metres_off_as_planned():
-    """FAST's cables are 300 m long: 5 % of them are no distance that goes unreported."""
+    """FAST's cables are 300 m long, of which 5 % would be too far."""
     fast = load("fast")
     assert Deviation(fast).are_far(fast.home + 0.06 * np.eye(6)[0], fast.home)
 

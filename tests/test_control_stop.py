@@ -178,7 +178,7 @@ def test_stops_in_time_carry_the_loads_of_phases_within_their_tolerances():
 
 @pytest.mark.parametrize("floor", [None, 0.9])
 def test_what_is_offered_stops_in_time_when_it_is_planned(floor):
-    """On a path below the floor too, whose shift alone would leave a motion that stops too late."""
+    """With a floor above the path, the shift that is offered alone would leave a motion that stops too late."""
     robot = load("point-mass-3").model_copy(update={"floor": floor})
     line = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 0.8]}
     task = {"path": line, "duration": 1.3, "stop_within": 0.06}

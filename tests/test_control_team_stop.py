@@ -106,7 +106,7 @@ def test_a_stop_that_begins_before_the_end_of_a_plan_and_goes_beyond_it_is_feasi
 
 @pytest.mark.parametrize("together", [True, False])
 def test_a_plan_that_ends_while_the_team_moves_goes_on_smoothly(made, together):
-    """Velocities and accelerations are the derivatives of what is before them, and nothing jumps at the end."""
+    """Velocities are the derivatives of poses, accelerations those of velocities, and nothing jumps at the end."""
     _, found = made
     trajectory = continued(planned(found.trajectory.sel(time=slice(0.0, 1.2)))[1], together)
     times, h = trajectory.duration + np.linspace(-0.05, 1.5, 311), 1e-4

@@ -49,7 +49,7 @@ def test_names_of_numbers_are_a_list(names):
 
 
 def test_drawn_robots_have_the_covariance():
-    """The factor has it exactly; variances of 1000 draws, with a relative deviation of sqrt(2 / 1000), within 20 %."""
+    """The factor is exact; variances of 1000 draws, which deviate by sqrt(2 / 1000), are within 20 %."""
     robot = known()
     factor = robot.uncertainty.factor
     np.testing.assert_allclose(factor @ factor.T, MIXED, rtol=1e-9, atol=1e-9 * np.abs(MIXED).max())

@@ -98,7 +98,7 @@ def test_encoders_are_no_geometry():
 
 @pytest.mark.parametrize("name", ["multi-quadrotor-3", "wang-ctmrts"])
 def test_the_uncertainty_moves_poses_at_rest(name):
-    """Derivatives by the file's parameters against equilibria of robots that differ a little."""
+    """Derivatives by the file's parameters agree with equilibria of slightly different robots."""
     sizes = {"anchor.x": 1e-3, "anchor.z": 1e-3, "attachment.x": 1e-3, "attachment.y": 1e-3, "encoder.offset": 1e-3}
     robot = uncertain(name, sizes)
     lengths = Dynamics(robot).cable_lengths(robot.home)

@@ -370,7 +370,7 @@ def test_decimal_commas_and_a_map_for_one_of_two_files(tmp_path):
 
 
 def test_attitudes_of_drones_in_degrees(tmp_path):
-    """As ArduPilot writes them, without a unit: north, east, down, and a throttle that the suggested map gives one."""
+    """ArduPilot writes north, east, down and throttle without units; the suggested map gives the throttle one."""
     t, x, drones = user.team(12)
     ned, frd = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]]), np.diag([1, -1, -1.0])
     names, columns = ["TimeUS"], [np.round(1e6 * t)]

@@ -58,7 +58,7 @@ def test_derivatives_are_those_of_the_dynamics(name):
 
 
 def test_spread_is_that_of_drawn_robots():
-    """Of independent errors, each changes the tensions of least change: squares of differences of robots add up."""
+    """The squared changes of tensions due to independent errors add up to those of drawn robots."""
     robot = known("cogiro", 1e-3)
     pose = robot.home[None] + [0.5, 0.3, 0.2, 0.05, 0, 0.1]
     tensions = np.full((1, 8), 400.0) + 30 * np.arange(8)

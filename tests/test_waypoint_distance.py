@@ -19,7 +19,7 @@ def path(points=LIFT, **more):
 
 
 def seen(found, point, low=-np.inf, high=np.inf):
-    """The nearest that the saved motion comes to a point between two times [m]."""
+    """Return the smallest distance of the saved motion from a point between two times [m]."""
     motion = found.trajectory.sel(time=slice(low, high)).pose.values
     return np.linalg.norm(motion[:, :3] - point, axis=1).min()
 

@@ -30,7 +30,7 @@ def with_winches(name, winch=None, **keys):
 
 
 def motors(plant, state, tensions, period=1e-3, **command):
-    """Return the motors' forces for tensions, and the row of the command that has them."""
+    """Return the motors' forces for tensions, and the command with them."""
     row = plant.command(np.asarray(tensions, dtype=float), **command)
     winch_forces(plant.record, plant.settings, state, row, period)
     return row[layout.COMMANDS : layout.COMMANDS + plant.robot.m].copy(), row
@@ -38,7 +38,7 @@ def motors(plant, state, tensions, period=1e-3, **command):
 
 @pytest.mark.parametrize(("speed", "sign"), [(0.3, 1), (-0.3, -1), (0.0, 1)])
 def test_a_motor_that_lifts_carries_load_inertia_and_friction(speed, sign):
-    """By hand: with the tension t a mass m rises with a = t / m - g, its motor needs t + J a, and friction."""
+    """By hand: under the tension t a mass m rises with a = t / m - g, and its motor needs t + J a plus friction."""
     plant = Plant(Robot.model_validate(LIFT), drive="forces")
     state = plant.start(velocity=[0, 0, speed, 0, 0, 0], tensions=[50.0])
     assert plant.read(state).length_rates == pytest.approx([-speed])
@@ -68,7 +68,7 @@ def test_the_forces_make_the_tensions_of_a_moving_robot_as_commanded(name):
 
 @pytest.mark.parametrize(("EA", "inertia"), [(1e4, 3.0), (1e6, 3.0), (1e6, 0.2)])
 def test_the_tension_of_an_elastic_cable_reaches_its_command_without_oscillation(EA, inertia):
-    """By a load that hardly moves: e - e* = (1 + w t) exp(-w t) (e0 - e*), with w = 400 rad/s or that of the cable."""
+    """The load hardly moves, so e - e* = (1 + w t) exp(-w t) (e0 - e*), with w = 400 rad/s or that of the cable."""
     data = LIFT | {"platform": LIFT["platform"] | {"mass": 1e9}, "gravity": [0, 0, 0]}
     own = {"stiffness": EA, "winch": WINCH | {"inertia": inertia, "friction": 0.0}}
     data["cables"] = [data["cables"][0] | own]
@@ -86,7 +86,7 @@ def test_the_tension_of_an_elastic_cable_reaches_its_command_without_oscillation
 @pytest.mark.parametrize("keys", [{}, {"stiffness": 2e4}, {"stiffness": 2e5, "damping": 50}])
 @pytest.mark.parametrize("inertia", [0.1, 10.0])
 def test_winches_with_friction_and_inertia_do_not_change_a_motion(keys, inertia):
-    """Of 5 kg under three cables; motors that pulled with the tensions would leave it 0.1 m behind."""
+    """Motors that pulled with the tensions themselves would leave 5 kg under three cables 0.1 m behind."""
     robot = with_winches("point-mass-3", {"inertia": inertia, "friction": 5.0}, **keys)
     circle = {"kind": "circle", "centre": [0, 0, 1], "radius": 0.3, "rate": 1.5}
     run = simulate(robot, circle, duration=0.8)
@@ -105,7 +105,7 @@ def test_drives_work_faster_than_a_light_winch_on_a_stiff_cable_swings():
 
 
 def test_elastic_cables_of_a_fixed_length_have_it_under_the_planned_tension():
-    """Of quadrotors at rest with their load; as long unstrained, they would be slack at first, and the load fall."""
+    """If they had it unstrained, they would be slack at first, and the load of three quadrotors would fall."""
     data = load("multi-quadrotor-3").model_dump()
     data["cables"] = [cable | {"stiffness": 2e3, "damping": 10} for cable in data["cables"]]
     robot = Robot.model_validate(data)

@@ -17,7 +17,7 @@ REACH = 0.0577350269  # of an attachment from the load's middle [m]
 
 @pytest.fixture(scope="module")
 def timed():
-    """The loops of each drive, and their processor time [s]."""
+    """Return the loops of each drive, and their processor time [s]."""
     results = {}
     for drive in DRIVES:
         start = time.process_time()

@@ -1,5 +1,5 @@
 /*
- * The forces with which the motors of winches give commanded tensions, as their drives compute them from winch and cable:
+ * Forces with which the motors of winches give commanded tensions t*, as a drive computes them:
  *
  *     u = t* + P (t* - t) - J a - D de/dt - friction s,      a = d2l/dt2 L0 / l,     de/dt = dl/dt L0 / l - dL0/dt
  *
@@ -8,7 +8,7 @@
  *
  *     J d2e/dt2 + 2 sqrt((1 + P) K J) de/dt + (1 + P) K (e - e*) = 0        while the bodies move as commanded,
  *
- * with QUICK or the frequency of winch and cable, whichever is higher, but no faster than the period permits. The sign s
+ * at QUICK or the frequency of winch and cable, whichever is higher, but no faster than the period permits. The sign s
  * of the winch's speed is the mean over the period, so that friction neither holds nor drives the winch.
  */
 #ifndef TOWLINE_PLANT_WINCH_FORCES_H

@@ -1,4 +1,4 @@
-/* The plant for Python: runs of many states, sensors, and what winches are commanded. */
+/* The plant for Python: runs of many states, sensors, and commands of winches. */
 #include "plant/plant.h"
 
 #include "python/arrays.h"

@@ -2,8 +2,7 @@
 
 A motion capture measures the pose X of some body in some frame; the file's pose is T X B with the pose T of its frame
 in {G} and the pose B of the platform frame in the body. Both are fitted to the cable lengths with the file's anchors
-and attachments, up to the offsets (and, if these are counted, the scales) of the readings, from all turns of the axes
-by right angles.
+and attachments, up to the offsets of the readings (and scales of counts), from all turns of the axes by right angles.
 """
 
 from collections.abc import Sequence
@@ -148,7 +147,7 @@ def _placed(frames: Sequence[np.ndarray], position: np.ndarray, rotation: np.nda
 
 
 def _residuals(log: LogPart, frames: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Return lengths less readings up to offsets and scales of counted readings, (S, m N) [m].
+    """Return lengths minus readings up to offsets, and scales if `log.counted`, (S, m N) [m].
 
     The second result has the derivatives by shifts and turns, (S, m N, 12).
 

@@ -39,11 +39,11 @@ BLOCKS = 25  # of the record, of at least so many samples each, to see whether r
 SHORTEST_BLOCK = 8
 UNBALANCED = 1 - 1e-7  # share of sound samples whose forces are in better balance than those that are left out
 BY_CHANCE = 2.0  # standard deviations by which the ratio of variances may exceed 1 where residuals are independent
-NEAR_LIMIT = 0.25  # of the largest size of a residual, in which the density of residuals near the limit is counted
+NEAR_LIMIT = 0.25  # of the largest residual: range below it in which the density of residuals is counted
 UNEQUAL = 1.5  # times the variance of the squares of normally distributed errors
-MOST_LOST = 0.5  # of E psi'
+MOST_LOST = 0.5  # largest reduction of E psi'
 MOST_LEVERAGE = 0.9  # of a block; with more, its residuals would be far too uncertain
-FORCES_BY_CHANCE = 0.1  # of which the noise of forces may differ from the stated one
+FORCES_BY_CHANCE = 0.1  # by which the noise of forces may differ from the stated one
 
 
 class Outlier(NamedTuple):
@@ -132,7 +132,7 @@ def autocorrelation(model: Model, state: State, inverse: np.ndarray, rank: int, 
 
 
 def _by_left_out(model: Model, state: State) -> float:
-    """Return the factor of the variances of parameters because a fit prefers to leave out readings that disagree.
+    """Return the factor by which leaving out readings that disagree increases the variances of parameters.
 
     An M-estimator has the variance E psi^2 / (E psi')^2 with psi(e) = e up to a limit c and 0 beyond, for which E psi'
     is smaller by c times the density of errors at +-c. A sample that is left out in part loses one redundant equation.

@@ -195,7 +195,7 @@ class CalibrationData(Displayed):
 
     @property
     def autocorrelation(self) -> float:
-        """Return the factor of the covariance for errors that are autocorrelated, or wrong but unseen; else 1."""
+        """Return the factor of the covariance for autocorrelated errors and undetected wrong readings, else 1."""
         return self._noise[1]
 
     @property

@@ -148,9 +148,7 @@ def angles_at(times: np.ndarray | None, reader: Reader, found: Fields, notes: li
         if np.nanmax(np.abs(samples.values[:, :2]), initial=0.0) > MOST_TILT:
             samples = Samples(samples.times, np.radians(samples.values))
             if notes is not None:
-                notes.append(
-                    f"{found.orientation[0].full} and angles like it are read in degrees, since they exceed pi"
-                )
+                notes.append(f"angles such as {found.orientation[0].full} are read in degrees, because they exceed pi")
         samples = Samples(samples.times, np.unwrap(samples.values, axis=0))
         return at_times(times, samples, found.orientation[0]).values
     from scipy.spatial.transform import Rotation

@@ -100,7 +100,7 @@ class PoseEstimate(Displayed):
 
     @property
     def consistent(self) -> Any:
-        """Return whether noise of `sigma` and the file's `uncertainty` explain residuals, by a chi-square test at 1 %.
+        """Return whether noise of `sigma` and the file's `uncertainty` explain residuals (chi-square test at 1 %).
 
         With no more cables than coordinates nearly all lengths fit some pose, and the test is meaningless. Lengths with
         an equilibrium are consistent.

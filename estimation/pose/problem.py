@@ -53,7 +53,7 @@ class Problem(NamedTuple):
         """
         moved, errors, steps = np.array(poses, order="C"), np.empty(lengths.shape), np.empty(len(lengths))
         free = self.free if free is None else free
-        measured = np.ascontiguousarray(lengths)  # whatever the order of the columns they were computed from
+        measured = np.ascontiguousarray(lengths)
         descend(self.record, self.carriers, measured, weights, free, np.array(damping), moved, errors, steps)
         return moved, errors, steps > 0.0
 

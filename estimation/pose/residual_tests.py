@@ -16,7 +16,7 @@ from .parameter_errors import length_errors
 
 BLOCK = 5000  # poses, so that few derivatives are in memory at once
 SINGULAR = 1e-9  # share of the largest singular value
-EXPLICABLE = 1e16  # squared error in standard deviations, of which a file's uncertainty may explain some
+EXPLICABLE = 1e16  # squared error in standard deviations; no uncertainty of a file explains more
 
 
 def squares_of(

@@ -56,9 +56,9 @@ def resting(own: PoseEstimate, problem: Problem, lengths: np.ndarray, starts: np
 def _motions(robot: Robot, rest: Equilibrium, lengths: np.ndarray, carriers: np.ndarray) -> list[np.ndarray]:
     """Return motions of the platform frame, as its shift and a small rotation in {G}, at an equilibrium.
 
-    They are those by measured lengths, (6, m), and by the uncertain parameters of the file, (6, p), and neutral ones,
-    (6, k). With the energy E = -m g c + sum t_i (l_i - L_i), a parameter acts like a change of lengths and the wrench
-    -d^2 E / (dpose dparameter).
+    They are the derivatives by measured lengths, (6, m), and by the file's uncertain parameters, (6, p), and neutral
+    motions, (6, k). With the energy E = -m g c + sum t_i (l_i - L_i), a parameter acts like a change of lengths and the
+    wrench -d^2 E / (dpose dparameter).
     """
     by_length, compliance, neutral = sensitivity(robot, rest, carriers)
     step = STEP * np.diag([robot.length] * 3 + [1.0] * 3)

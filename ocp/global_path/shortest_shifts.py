@@ -6,15 +6,15 @@ import numpy as np
 
 from ..tasks.scenario import POSITION, Scenario
 
-STEP = 1.3  # of a shift to the next one that is tried
-SHIFTS = STEP ** np.arange(-36, 3)  # that are tried, in parts of the robot's size
+STEP = 1.3  # ratio of successive shifts
+SHIFTS = STEP ** np.arange(-36, 3)  # in parts of the robot's size
 HALVINGS = 5
 
 
 def shortest_shifts(scenario: Scenario, size: float, holds: Callable[[np.ndarray], bool]) -> Iterator[np.ndarray]:
-    """Yield the shortest shift (3,) [m] that `holds` in each direction along an axis that the platform has.
+    """Yield the shortest shift (3,) [m] along each axis and direction that `holds`, the shortest of all first.
 
-    The shortest of all comes first. `size` is that of the robot [m].
+    `size` is that of the robot [m].
     """
     ways = [sign * np.eye(3)[axis] for axis in POSITION if scenario.robot.dof_mask[axis] for sign in (1, -1)]
     for far in SHIFTS * size:

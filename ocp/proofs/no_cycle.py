@@ -1,17 +1,18 @@
 """Prove that no cycle has tensions: `no_cycle`.
 
-At the end of a cycle the platform has the momentum with which it began, and the angular momentum about a fixed point.
-So along any periodic direction f of forces, and a constant direction c of moments about that point, cables and weight
-together give in the mean what the momentum takes along f: the mean of m p . f'', with the position p of the CoM. If the
-platform does not turn, the moments about its CoM are balanced at all times, so that c may change, too.
+A cycle ends with the momentum, and the angular momentum about a fixed point, with which it begins. Along any periodic
+direction f of forces and constant direction c of moments about that point, the mean wrench of cables and weight is
+therefore the mean of m p . f'' (integration by parts), with the position p of the CoM. If the platform does not turn,
+the moments about its CoM are balanced at all times, so c may change, too.
 
 A cable of tension t gives t x along (f, c), x = (f + c x a) . u, with its lever a and its direction u. If in the mean
 all cables together give less than weight and momentum take, wherever the tube lets the platform be, there is no cycle.
-Linear programs find the directions at some places, linear between them, for some poses, to which they add those that
-the directions leave unproven. About each place the tube is a box of offsets, in which x differs from a mean of those at
-the corners by at most half the square of half its size times the second derivative, summed over the offsets. What the
-cables give is convex in (f, c), so between two places it is at most the mean of both, each with the poses between them.
-If the duration is a choice, so is when the platform is where: then the worst place counts, and f is constant.
+Linear programs find directions at nodes of the path, linear between them, for some poses; the poses that they leave
+unproven are added for the next program. About each place the tube is a box of offsets, in which x differs from a mean
+of those at the corners by at most half the square of half its size times the second derivative, summed over the
+offsets. What the cables give is convex in (f, c), so between two places it is at most the mean of both, each with the
+poses between them.
+If the planner chooses the duration, f is constant, and the worst place counts instead of the mean.
 """
 
 import numpy as np
@@ -54,7 +55,7 @@ def no_cycle(scenario: Scenario) -> list[Excess]:
 
 
 def _rests(scenario: Scenario) -> bool:
-    """Return whether tensions hold the platform at rest on its path, everywhere or, if when is a choice, somewhere."""
+    """Return whether tensions hold the platform at rest everywhere on its path (somewhere if the duration is free)."""
     motion, carriers = scenario.motion(np.linspace(0.0, scenario.duration, PLACES), None)
     still = np.zeros_like(motion.pose)
     A = scenario.dynamics.wrench_matrix(motion.pose, carriers.pose)
@@ -159,9 +160,9 @@ class Cycle:
         return directions / np.linalg.norm(directions, axis=1).max()
 
     def shortfall(self, directions: np.ndarray) -> tuple[float, set[tuple[int, int]]]:
-        """Return a lower bound of what is missing along directions (n, 6) in the whole tube, and where most is not.
+        """Return a lower bound of the shortfall along directions (n, 6) in the whole tube, and where it is smallest.
 
-        The latter are pairs of place and corner, one of each node.
+        The latter are pairs of place and corner, one for each node.
         """
         f, c = directions[:, None, None, :3], directions[:, None, None, 3:] / self._length
         along = f + np.cross(c, self._levers)  # (n, k, m, 3)

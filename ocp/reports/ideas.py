@@ -28,7 +28,7 @@ from ..warnings.slipped_units import READS
 IN_THE_WAY = {"keep_out", "cable_clearance", *OF_BODY}
 TO_MOVE = 1.5  # times what carries the weight: tilted thrust and acceleration need more
 FELT = 0.02  # of the weight: a wind with less force is hardly why tensions are missing
-STEPS = 100  # of the robot's size: its positions are offered in round steps that are at most so long
+STEPS = 100  # at least, in the robot's size: positions are offered in round steps
 ALONG = 51  # positions of a line that are checked
 ENDS = ("start", "end")
 
@@ -198,7 +198,7 @@ def _strength(plan: PlanData) -> list[Fact]:
 
 
 def _wind(plan: PlanData) -> list[Fact]:
-    """Return the force of a task's wind on the platform at rest, if tensions are missing and the platform feels it."""
+    """Return the force of a task's wind on the platform at rest, if tensions are missing and it is not negligible."""
     wind, scenario = plan.scenario.task.wind, plan.scenario
     if wind is None or isinstance(wind, WindBox | WindDisc) or not _lacks_tensions(plan):
         return []

@@ -70,9 +70,9 @@ def largest_share(search: Search, change: Change | None, most: float = 1.0, rate
 def together(search: Search, scenario: Scenario, makers: Sequence[Maker]) -> list[Relaxed]:
     """Return changes that make a motion feasible only together; [] if all of them do not.
 
-    Each change is as easy as can be at first. One after another, in the order of `makers`, is left out if the others
-    suffice without it; where only programs show that, at the end. Those that remain have the largest share that all can
-    have, and then each as much as it can.
+    Each change is as easy as can be at first. In the order of `makers`, each is left out if the others suffice without
+    it (at the end, if only programs show that). The others have the largest share that all can have, and then each as
+    much as it can.
     """
 
     def easy(makers: Sequence[Maker]) -> bool:
@@ -99,7 +99,7 @@ def together(search: Search, scenario: Scenario, makers: Sequence[Maker]) -> lis
         return []
     part, plan = found
     shares = part * shares
-    for make in tuple(kept) if by_programs(scenario) else ():  # what the closest of all motions can do without
+    for make in tuple(kept) if by_programs(scenario) else ():
         left = np.array([each is not make for each in kept])
         others = [each for each in kept if each is not make]
         varied = _legal(lambda _, those=others, its=shares[left]: _changed(scenario, those, its)[1], 1.0)

@@ -131,7 +131,7 @@ def _judged(plan: Plan, scenario: Scenario, seconds: float) -> Plan:
 
 
 def _to_stop(plan: Plan, seconds: float) -> Offers:
-    """Return the duration with which the motion of a plan stops in so many seconds, and what `stop_within` it keeps."""
+    """Return the duration with which a plan's motion stops in so many seconds, and the `stop_within` that it keeps."""
     return Offers([*_longer(plan, seconds), *_longer_stop(plan, seconds)])
 
 

@@ -34,7 +34,7 @@ MOST_IN_BENDS = 6400  # in all together, if that is more than LEAST in each
 CLOSE = 1e-9  # of s
 LOOKS = 2001  # points at which the geometry is checked
 HALVES = 40  # of the s between two of them
-FINE = 10  # times as many points at which the bound of a zone is known
+FINE = 10  # times as many points at which the bound of a zone is computed
 
 
 class PathLimits(NamedTuple):
@@ -130,7 +130,7 @@ class ParametrisedPath:
         return high
 
     def rises(self, zone: ZoneSpeed, share: float) -> np.ndarray:
-        """Return points, (k,) of s, from each to the next of which the bound of a zone changes by so large a share.
+        """Return points, (k,) of s, between which the bound of a zone changes by `share` each time.
 
         Between two points of a grid the square of the speed is linear in s, and may exceed a bound that is not.
         """

@@ -42,7 +42,7 @@ RESERVE = 1e-7  # of the weight, kept from the tension limits against rounding
 LARGEST_RESERVE = 0.01  # of the weight
 LARGEST_SHRINK = 0.01
 COARSE = 4e-3  # of the weight: if more is missing it takes a finer grid, if less a reserve there
-RISE = 2.5  # intervals in which the bound of a zone changes e-fold, over all intervals
+RISE = 2.5  # times 1 / intervals: change of the logarithm of a zone's bound from point to point
 CLOSEST = 1e-3  # of a step of a grid: points that are nearer to each other are one
 COARSE_EXCESS = 1e-4  # of a limit: if it is exceeded by more it takes a finer grid, if by less some distance everywhere
 
@@ -156,7 +156,7 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
 def _through(s: np.ndarray, corners: np.ndarray, rises: np.ndarray) -> np.ndarray:
     """Return a grid with further points at corners of the bound of the speed and where that rises.
 
-    A law that is slow enough at the first point in a zone would be too fast between its edge and that point.
+    A time law that is slow enough at the first point in a zone would be too fast between its edge and that point.
     """
     least = CLOSEST * (s[-1] - s[0]) / len(s)
     points = s[[0, -1]]

@@ -18,8 +18,7 @@ enum {
     UNIT_COMMAND = TOWLINE_PLATFORM_COMMANDS + UNIT_CABLES + TOWLINE_CARRIER_COMMANDS * UNIT_CARRIERS
 };
 
-/* What the plant makes of tensions: nothing, because `winches` has its commands; commands; lengths or motors' forces,
- * within a step. */
+/* Commands of the plant's cables: those of `winches`; tensions; lengths or motor forces that give the tensions. */
 typedef enum { UNIT_WINCHES = 0, UNIT_TENSIONS = 1, UNIT_BY_LENGTHS = 2, UNIT_BY_FORCES = 3 } unit_cables;
 
 /* What an importer may do, by the mode that it has brought the unit to. */
@@ -32,7 +31,7 @@ typedef struct {
     towline_robot robot;
     towline_plant plant;
     double longest_step; /* of Runge-Kutta [s] */
-    double winding_time; /* for which winches that reach tensions keep their rates or forces [s] */
+    double winding_time; /* how long winches keep a rate or force on the way to a tension [s] */
     double mass;         /* of the platform [kg] */
     double state[UNIT_STATE], last_rates[UNIT_CABLES];
     /* The controller, and what it knows of the robot. */
