@@ -161,6 +161,8 @@ class Matching:
             best = better
             if (np.abs(np.atleast_1d(getattr(best.parameters, name)) - value) < 0.1 * sigma).all():
                 break
+            if size > 1 and best.cost[used].sum() > (1 - LEAST[0] / 2) * first.cost[used].sum():
+                break  # so little explained is not named, and each step takes a simulation for each number
         return best, sigma
 
     def explanations(self, first: Match, used: np.ndarray) -> list[tuple[Explanation, Match]]:
