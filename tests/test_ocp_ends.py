@@ -414,7 +414,7 @@ def test_a_cycle_whose_mean_no_tensions_give_is_proven_infeasible():
 
 @pytest.mark.parametrize(("seconds", "status"), [(1.5, "infeasible"), (2.8, "feasible"), (8.0, "infeasible")])
 def test_a_circle_beyond_the_anchors_exists_only_near_the_frequency_of_a_pendulum(seconds, status):
-    """In a slower circle nothing pulls the mass out past the anchors; in a faster one nothing pulls it back hard enough."""
+    """In a slower circle nothing pulls the mass out past the anchors; in a faster one nothing pulls it in enough."""
     cables = [
         {"carrier": "frame", "anchor": anchor, "attachment": [0, 0, 0], "t_min": 1, "t_max": 150}
         for anchor in ([2, 0, 3], [-1, 1.7, 3], [-1, -1.7, 3])

@@ -73,7 +73,7 @@ def test_the_default_region_is_above_the_floor_and_in_the_room():
 
 
 def test_the_default_region_of_a_long_robot_is_no_wider_than_its_platform_can_be():
-    """Farther beyond the anchors than an attachment is from the CoM, all cables pull back, and nothing balances them."""
+    """Farther beyond the anchors than an attachment is from the platform's origin, all cables pull back."""
     ends = [([12 * x, y, 3], [-0.2 * x, 0.3 * y, 0.4 * z]) for x in (-1, 1) for y in (-1, 1) for z in (0, 1)]
     platform = {"mass": 5, "inertia": [1, 1, 1, 0, 0, 0], "home": [0, 0, 0, 0, 0, 0]}
     robot = framed(ends, platform, t_max=500)
