@@ -170,14 +170,13 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
 
     from ..base.text import quantity, quantity_range, quantity_row
 
-    attitude = "in its home attitude"
+    movable, attitude = any(carrier.moves for carrier in robot.carriers), "in its home attitude"
+    held = f"{attitude} and with its carriers at home" if movable else attitude
     if box is None and robot.fixed_lengths is not None:
         return ["  no box of positions at which it can rest is known"]
     if box is None:
-        movable = any(carrier.moves for carrier in robot.carriers)
         hint = ["    (in a plan with `base: {kind: free}` the carriers can move too)"] if movable else []
-        where = "at any of the sampled positions"
-        return [f"  cannot rest, {attitude} and with its carriers at home, {where}", *hint]
+        return [f"  cannot rest, {held}, at any of the sampled positions", *hint]
     sides = [
         f"{'xyz'[axis]} {quantity_range([box.low[axis], box.high[axis]], 'm', 3)}"
         if np.isfinite(box.high[axis])
@@ -192,7 +191,7 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
             f"  can rest, {attitude}, {where}",
             "    (the carriers move with it, because the cable lengths are constant)",
         ]
-    lines = [f"  can rest, {attitude} and with its carriers at home, in the box", f"    {', '.join(sides)}"]
+    lines = [f"  can rest, {held}, in the box", f"    {', '.join(sides)}"]
     if (box.centre != robot.home[:3]).any():
         lines[0] += f" about ({quantity_row(box.centre)}) m, the sampled position nearest to home at which it can rest"
     steps = quantity_row(box.spacing[box.spacing > 0], digits=2)

@@ -37,7 +37,7 @@ def ideas(plan: PlanData) -> list[Fact]:
     """Return what may help, the most likely first; empty for a feasible plan, or if nothing is known to."""
     if plan.feasible:
         return []
-    more = [("more", "may be feasible: the search for changes was cut short")] * plan.cut_short
+    more = [("more", "other changes may be feasible: the search for changes was cut short")] * plan.cut_short
     found = [*_directions(plan), *_obstacles(plan), *_carriers(plan), *_strength(plan), *_wind(plan)]
     if plan.relaxations:
         return found + more
