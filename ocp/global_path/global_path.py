@@ -87,10 +87,13 @@ class GlobalPath(Displayed):
         return float(np.clip(max([scenario.duration, *by_speed, *by_rate]), span.min, span.max))
 
 
-def find_global_path(scenario: Scenario, seconds: float = np.inf) -> tuple[GlobalPath | None, str]:
+def find_global_path(
+    scenario: Scenario, seconds: float = np.inf, most: tuple[int, int] | None = None
+) -> tuple[GlobalPath | None, str]:
     """Return a path, or None, and a message: its length, or why there is none.
 
-    The same scenario has the same path, unless the time of `seconds` ends first.
+    The same scenario has the same path, unless the time of `seconds` ends first. At `most` so many configurations are
+    evaluated with each reserve; default: as many as a plan deserves.
     """
     space, deadline = Space(scenario), time.perf_counter() + seconds
     rest = AtRest(scenario, space.size)
@@ -99,13 +102,13 @@ def find_global_path(scenario: Scenario, seconds: float = np.inf) -> tuple[Globa
     for end, slack, worst in zip(("start", "end"), kept.slack, kept.worst, strict=True):
         if slack < -STILL:
             return None, f"no path, since the {end} exceeds {limit_name(scenario, int(worst))} too"
-    budgets = MOST_OF_TEAM if space.shaped else MOST
-    for part, most in zip(RESERVES, budgets, strict=True):
+    budgets = most or (MOST_OF_TEAM if space.shaped else MOST)
+    for part, budget in zip(RESERVES, budgets, strict=True):
         rng = np.random.default_rng(0)
-        clear = ClearSpace(space, rest, min(part * space.size, MOST_RESERVE), most, deadline)
+        clear = ClearSpace(space, rest, min(part * space.size, MOST_RESERVE), budget, deadline)
         found = _connected(clear, rng)
         if found is not None and not space.shaped:
-            clear.most = clear.evaluated + min(AGAIN * clear.evaluated, most)
+            clear.most = clear.evaluated + min(AGAIN * clear.evaluated, budget)
             shorter = _connected(clear, rng, found.length)
             if shorter is not None and shorter.length < found.length:
                 found = shorter

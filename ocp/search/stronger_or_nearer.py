@@ -24,6 +24,7 @@ from ..tasks.task import Tube
 from ..tasks.wind_set import WindBox, WindDisc
 from .largest_share import Change, Variation, by_programs, exceeds, largest_share, together
 from .other_paths import near_home, nearer_end, other_yaws, shifted_path, smaller_circle
+from .past_regions import IN_THE_WAY, past_regions
 from .relaxations import LONGER, longer_durations, near_motion, other_duration, planned, rounded, slower
 from .search import Search
 from .slower import longer, longer_phases, slower_rate, slower_states
@@ -42,7 +43,8 @@ def near_chosen_motion(search: Search, scenario: Scenario, deviation: Deviation 
     slower_helps = span[0] < span[1] or not scenario.stretches
     phases = longer_phases(search, scenario, audit) if slower_helps else []
     found = (
-        _without_regions(search, scenario, deviation, audit)
+        (past_regions(search, scenario) if scenario.task.tube.position == "free" and _in_the_way(audit) else [])
+        or _without_regions(search, scenario, deviation, audit)
         or near_motion(search, scenario, deviation, audit, span)
         or as_wide_as_states(search, scenario, audit)
         or slower_states(search, scenario)
@@ -50,7 +52,7 @@ def near_chosen_motion(search: Search, scenario: Scenario, deviation: Deviation 
     if found:
         return phases + found
     if by_programs(scenario):
-        return phases + _by_a_program(search, scenario)
+        return phases + _by_a_program(search, scenario, audit)
     along = search.audit_motion(scenario, None, "audit of the path")
     exact = durations(with_task(scenario, tube=Tube()))
     found = other_duration(search, scenario, exact, along) if slower_helps else []
@@ -61,19 +63,22 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
     """Return feasible variations of what a task does not name: where its path is, the platform's mass, t_max, t_min.
 
     `audit` is that of the motion exactly on the path. Each variation is one change. If there is none, it is a path of
-    the same form near the platform's home, or else several changes together. Where only a region is in the way, none is
-    returned: ideas name other places and ways round. The list is empty for uncertain robots.
+    the same form near the platform's home, or else several changes together, such as fewer regions. The list is empty
+    for uncertain robots.
     """
     task = scenario.task
     if task.robust is not None:
         return []
     if by_programs(scenario):
-        return _by_a_program(search, scenario)
-    found, blocked = _changes(search, scenario, audit), _blocked(audit)
-    if found or not blocked:
+        return _by_a_program(search, scenario, audit)
+    fewer = partial(_fewer_regions, audit=audit)
+    found = past_regions(search, scenario) if _in_the_way(audit) else []
+    found += _changes(search, scenario, audit)
+    if not found and _blocked(audit):
+        found = [each for make in (nearer_end, fewer) for each in largest_share(search, make(scenario))]
+    if found or not _blocked(audit):
         return found or largest_share(search, near_home(scenario), rates=True) or together(search, scenario, TOGETHER)
-    several = together(search, scenario, (partial(_fewer_regions, audit=audit), *TOGETHER))
-    return several if len(several) > 1 else []
+    return together(search, scenario, (fewer, *TOGETHER))
 
 
 def _without_regions(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> list[Relaxed]:
@@ -89,10 +94,9 @@ def _without_regions(search: Search, scenario: Scenario, deviation: Deviation | 
 
 
 def _fewer_regions(scenario: Scenario, audit: Audit) -> Change | None:
-    """Return the change of the regions to those that the audited motion does not pass through."""
+    """Return the change of the regions to those from which the audited motion keeps its clearances."""
     limits, given = scenario.task.limits, scenario.task.limits.keep_out
-    inside = [excess.about for excess in audit.excess if excess.limit == "keep_out" and excess.value < 0]
-    through = {about.partition(" outside ")[2] for about in inside}
+    through = {excess.about.partition(" outside ")[2] for excess in audit.excess if excess.limit == "keep_out"}
     kept = tuple(region for region in given if region.name not in through)
     if len(kept) == len(given):
         return None
@@ -109,10 +113,15 @@ def _blocked(audit: Audit) -> bool:
     return any(excess.limit == "keep_out" for excess in audit.excess)
 
 
-def _by_a_program(search: Search, scenario: Scenario) -> list[Relaxed]:
+def _in_the_way(audit: Audit) -> bool:
+    return any(excess.limit in IN_THE_WAY for excess in audit.excess)
+
+
+def _by_a_program(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
     """Return the first change with which a program finds a motion, or else all together, since each solves programs."""
     every = partial(largest_share, search)
-    found = next(filter(None, (every(make(scenario)) for make in BY_PROGRAMS)), [])
+    found = past_regions(search, scenario) if _in_the_way(audit) else []
+    found = found or next(filter(None, (every(make(scenario)) for make in BY_PROGRAMS)), [])
     found = found or every(near_home(scenario), rates=True)
     return found or together(search, scenario, (*BY_PROGRAMS, longer))
 
@@ -125,7 +134,7 @@ def _changes(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
     found = largest_share(search, slower_rate(scenario), rates=True)
     factors = [slower(excess) for excess in audit.excess if excess.limit != TENSIONS]
     if min(factors, default=2.0) <= 1.0 or (factors and not scenario.stretches):
-        if _blocked(audit):  # ideas name other places and ways round
+        if _blocked(audit):
             inside = exceeds(scenario, np.array([scenario.duration]), rates=False)
             return found + (largest_share(search, nearer_end(scenario)) if inside else [])
         return found + (shifted_path(search, scenario) or largest_share(search, nearer_end(scenario)))
