@@ -211,11 +211,11 @@ class _Limits:
 
     @property
     def _until(self) -> float:
-        return self.begins + self._apart * len(self._rows.a)
+        return self.begins + self._apart * len(self._rows.falls)
 
     def _floor(self) -> np.ndarray:
         """Return the least x = r^2 from which the motion can go on inside the limits, at each instant, (n,)."""
-        floor, after = np.zeros(len(self._rows.a)), 0.0
+        floor, after = np.zeros(len(self._rows.falls)), 0.0
         if not self._goes_on or self._rows.can_rest.all():
             return floor
         ranges = np.array([self._rows.range_of(np.full_like(floor, x)) for x in LEVELS])
@@ -245,12 +245,11 @@ class _Limits:
 
 
 class _Bounds(NamedTuple):
-    """Bounds of u at n instants: low <= a u + b x <= high of k facets, |v u + g x| <= most of c carriers."""
+    """Bounds of u at n instants: least <= u + falls x <= most of k facets, |v u + g x| <= 1 of c carriers."""
 
-    a: np.ndarray  # (n, k), nan where a facet bounds nothing
-    b: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
+    least: np.ndarray  # (n, k), nan where a facet bounds nothing
+    most: np.ndarray
+    falls: np.ndarray
     vv: np.ndarray  # (n, c), v . v, and so on; nan where the carrier rests
     vg: np.ndarray
     gg: np.ndarray
@@ -258,14 +257,13 @@ class _Bounds(NamedTuple):
     @property
     def can_rest(self) -> np.ndarray:
         """Return at which instants the robot can rest, (n,)."""
-        least, most = self.range_of(np.zeros(len(self.a)))
+        least, most = self.range_of(np.zeros(len(self.falls)))
         return (least <= 0) & (most >= 0)
 
     def range_of(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the least and the largest u for x = r^2 of each instant, (n,)."""
-        at = self.b * x[:, None]
-        one, two = (self.low - at) / self.a, (self.high - at) / self.a
-        least, most = np.fmax.reduce(np.fmin(one, two), axis=1), np.fmin.reduce(np.fmax(one, two), axis=1)
+        fallen = self.falls * x[:, None]
+        least, most = np.fmax.reduce(self.least - fallen, axis=1), np.fmin.reduce(self.most - fallen, axis=1)
         least, most = np.fmax(least, -FASTEST), np.fmin(most, FASTEST)
         if self.vv.shape[1]:
             middle = -self.vg * x[:, None]
@@ -292,7 +290,8 @@ class _Instants(NamedTuple):
         low = self.low + np.clip((now - self.low) / 2, 0.0, inside)
         high = self.high - np.clip((self.high - now) / 2, 0.0, inside)
         low, high = np.minimum(low, now) - self.c, np.maximum(high, now) - self.c
-        return _Bounds(self.a, self.b, low, high, *self.carriers)
+        least, most = np.sort([low / self.a, high / self.a], axis=0)
+        return _Bounds(least, most, self.b / self.a, *self.carriers)
 
 
 def _instants(robot: Robot, trajectory: Trajectory, first: float) -> _Instants:

@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from towline import Dynamics, InputError, Planner, export_fmu, load, plan, simulate
 from towline.control import Predictive, Stop, longest_stop, references, stop
 from towline.models.parsing import to_yaml
-from towline.ocp.search.stops_within import stopping_within
+from towline.ocp.search import stops_within
 
 from .framed import framed
 from .told import told
@@ -98,6 +98,18 @@ def test_no_stop_takes_longer_than_the_longest(made):
         longest_stop(found, 1e-5)
 
 
+def test_a_duration_with_a_stop_that_takes_too_long_is_known_from_some_of_its_stops(monkeypatch):
+    counts, all_of = [], stops_within.longest_stop_along
+    monkeypatch.setattr(stops_within, "longest_stop_along", lambda *call: counts.append(len(call[2])) or all_of(*call))
+    path = {"kind": "line", "start": [-0.4, 0, 0.8], "end": [0.5, 0.2, 1.2]}
+    task = {"path": path, "duration": {"min": 0.2, "max": 9}, "objective": {"time": 0.05}, "stop_within": 0.25}
+    found = plan("point-mass-3", task)
+    assert found.feasible
+    whole = found.duration / stops_within.LEAST_PERIOD  # stops of one duration
+    assert sum(counts) < 0.5 * whole * sum(count < 0.5 * whole for count in counts)  # of which most are too short
+    assert longest_stop(found, 0.013).duration <= 0.25 + 0.008  # also from instants that planning has not looked at
+
+
 def test_where_the_planner_finds_only_a_much_slower_motion_the_fastest_law_is_slowed_down():
     path = {"kind": "line", "start": [-0.4, 0, 0.8], "end": [0.5, 0.2, 1.2]}
     fastest = {"path": path, "duration": {"min": 0.2, "max": 9}, "objective": {"time": 0.05}}
@@ -109,7 +121,7 @@ def test_where_the_planner_finds_only_a_much_slower_motion_the_fastest_law_is_sl
         return slow
 
     fast = planner.plan()
-    found = stopping_within(fast, planner.scenario, 0.2, climb)
+    found = stops_within.stopping_within(fast, planner.scenario, 0.2, climb)
     assert found.feasible
     assert len(calls) == 1
     assert fast.duration < found.duration < slow.duration

@@ -5,7 +5,7 @@ first longer by as much as the stop is too long, then between one that is too sh
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -15,7 +15,7 @@ from ...base.text import quantity
 from ...models.part import PositiveRange
 from ...models.rigid_load import RigidLoad
 from ...models.trajectory import Motion, Trajectory
-from ...statics.stops import beginnings, longest_stop_along
+from ...statics.stops import Stop, beginnings, longest_stop_along
 from ..audits.audit import audit
 from ..audits.excess import Excess
 from ..plan import Plan
@@ -28,6 +28,7 @@ from ..tasks.status import MotionStatus
 from .relaxations import rounded
 
 LEAST_PERIOD, INSTANTS = 0.02, 200  # [s], from the beginning of one stop to that of the next; and how many at most
+ONE_OF = 8  # stops is computed first, where it is enough to know that one takes too long
 ROUNDS = 10
 LEAST_STEP, STEP = 1.05, 1.5  # times the duration: at least, and where no stop keeps the tension limits
 CLOSE = 1.01  # times the longest duration that is known to be too short
@@ -48,11 +49,14 @@ def stopping_within(
         return plan
     span, begun, tried = scenario.duration_range, time.perf_counter(), 0
     short, enough = plan, None  # of two durations, the plan that stops too late and the one that stops in time
+    suspects: list[float] = []  # shares of the durations at which the longest stops of earlier plans begin
+    again = False  # whether the last two durations are on the same side
     shortest = 0.0  # of the durations that `climb` finds
     while tried < ROUNDS and span is not None and plan.stop is not None:
         if plan.feasible and plan.stop.duration >= NEAR * seconds:
             break
-        target = min(_between(short, enough, seconds), span.max)
+        suspects.append(plan.stop.begins / plan.duration)
+        before, target = plan, min(_between(short, enough, seconds, again), span.max)
         if (span.max if enough is None else enough.duration) <= CLOSE * short.duration:
             break
         if target < shortest:
@@ -64,7 +68,8 @@ def stopping_within(
             start = None if plan.deviation is None else plan.deviation.stretched(target / plan.duration)
             found = climb(replace(scenario, task=task, duration=target), start)
             shortest = found.duration if found.duration > CLOSE * target else shortest
-        plan, tried = _judged(found, scenario, seconds), tried + 1
+        plan, tried = _judged(found, scenario, seconds, suspects), tried + 1
+        again = plan.feasible == before.feasible
         if plan.feasible:
             best = enough = plan
         else:
@@ -91,20 +96,28 @@ def _slowed(plan: Plan, target: float) -> Plan | None:
     return found if audited.passed else None
 
 
-def _between(short: Plan, enough: Plan | None, seconds: float) -> float:
-    """Return the next duration to try [s], from the stops of two plans: they take as long as it is fast."""
+def _between(short: Plan, enough: Plan | None, seconds: float, halfway: bool = False) -> float:
+    """Return the next duration to try [s], from the stops of two plans: they take as long as it is fast.
+
+    One `halfway` between both is tried where stops jump, so that what they take does not lead there.
+    """
     stops = [
         np.inf if each is None or each.stop is None or not each.stop.feasible else each.stop.duration
         for each in (short, enough)
     ]
     if enough is None:
         return short.duration * (max(stops[0] / seconds, LEAST_STEP) if np.isfinite(stops[0]) else STEP)
-    share = np.log(stops[0] / seconds) / np.log(stops[0] / stops[1]) if np.isfinite(stops[0]) else 0.5
+    known = np.isfinite(stops[0]) and not halfway
+    share = np.log(stops[0] / seconds) / np.log(stops[0] / stops[1]) if known else 0.5
     return short.duration * (enough.duration / short.duration) ** float(np.clip(share, LEAST_SHARE, 1 - LEAST_SHARE))
 
 
-def _judged(plan: Plan, scenario: Scenario, seconds: float) -> Plan:
-    """Return a plan as one of the scenario's task, with its longest stop; not feasible if that takes too long."""
+def _judged(plan: Plan, scenario: Scenario, seconds: float, suspects: Sequence[float] = ()) -> Plan:
+    """Return a plan as one of the scenario's task, with its longest stop; not feasible if that takes too long.
+
+    With `suspects`, shares of the duration, stops that begin there and some others come first: if one takes too long,
+    the rest is not computed.
+    """
     plan = replace(plan, scenario=replace(plan.scenario, task=scenario.task))
     if not plan.feasible:
         return replace(plan, offers=partial(_that_stop, plan.offers, seconds))
@@ -113,15 +126,23 @@ def _judged(plan: Plan, scenario: Scenario, seconds: float) -> Plan:
     times = times[~plan.scenario.phases.resting(times)]  # on the ground the platform is at rest
     if not len(times):
         return plan
-    stops = [
-        longest_stop_along(scenario.robot, _trajectory(plan, extreme), times)
-        for extreme in (None, *range(plan.scenario.phases.extremes))
-    ]
-    its = max(stops, key=lambda each: (not each.feasible, each.duration))
+    first = np.zeros(len(times), dtype=bool)
+    if suspects:
+        first[::ONE_OF] = True
+        first[[np.abs(times - share * plan.duration).argmin() for share in suspects]] = True
+    stops: list[Stop] = []
+    for some in (times[first], times[~first]):
+        for extreme in (None, *range(plan.scenario.phases.extremes)) if len(some) else ():
+            stops.append(longest_stop_along(scenario.robot, _trajectory(plan, extreme), some))
+        its = max(stops, key=lambda each: (not each.feasible, each.duration), default=None)
+        in_time = its is not None and its.feasible and its.duration <= seconds * (1 + ROUNDING)
+        if its is not None and not in_time:
+            break
+    assert its is not None
     said = f"in at most {quantity(its.duration, 's')}" if its.feasible else "beyond the tension limits"
     stages = (*plan.stages, PlannerStep("stops", said, time.perf_counter() - begun))
     plan = replace(plan, stop=its, stages=stages)
-    if its.feasible and its.duration <= seconds * (1 + ROUNDING):
+    if in_time:
         return plan
     why = "" if its.certificate is None else f"no stop keeps the tension limits: {its.certificate.describe()}"
     excess = Excess("stop_within", "platform", its.begins, its.duration, seconds, "s", "at most", why)
