@@ -25,7 +25,8 @@ PARTS = 12  # of that, which are compared
 LOOKS = 16  # at the acceleration of two legs together
 TOGETHER = 1.1  # of the larger peak of one leg alone: the acceleration of two together
 BACK = 1e-3  # of the sum of the unit vectors of two legs: the path turns back, and rests there
-STEPS = 16  # of `meeting`: it needs 6
+STEPS, AT_BOUNDS = 30, 12  # of `meeting`: it mostly needs 6; those of them that may end at a bound
+ROUNDED = 1e-12  # of an overlap
 ROUNDS = 8  # of `even_out`: more change the times by less than a hundredth
 
 
@@ -156,14 +157,18 @@ class Overlap(Displayed):
         (length_before, last_before), (length_after, last_after) = before, after
         low, high = np.zeros_like(overlap), overlap
         at = (low + high) / 2
-        for _ in range(STEPS):  # by Newton's method, else by halves
+        for k in range(STEPS):  # by Newton's method, else by halves
             left, left_rate, _ = self.law((overlap - at) / last_before)
             done, rate, _ = self.law(at / last_after)
             value = length_after * done - length_before * left - ahead
             slope = length_after * rate / last_after + length_before * left_rate / last_before
             low, high = np.where(value < 0, at, low), np.where(value < 0, high, at)
-            next_at = at - value / np.maximum(slope, np.finfo(float).tiny)
-            at = np.where((next_at >= low) & (next_at <= high), next_at, (low + high) / 2)
+            step = value / np.maximum(slope, np.finfo(float).tiny)
+            good = (at - step >= low) & (at - step <= high) | (np.abs(step) <= ROUNDED * overlap)
+            # From a bound itself steps lead inside; halves would not come near a result that is next to it.
+            at = np.where(good, at - step, np.clip(at - step, low, high) if k < AT_BOUNDS else (low + high) / 2)
+            if (np.abs(step) <= ROUNDED * overlap).all():
+                break
         return at
 
 
