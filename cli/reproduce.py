@@ -43,7 +43,7 @@ def reproduce(paper: str, out: Path | None = None, form: FormatOption = "png", a
 
 def _show(account: Account) -> None:
     from ..studies.accounts.claim import Verdict
-    from ..studies.accounts.errata import numbers_text
+    from ..studies.accounts.files import numbers_text
 
     typer.echo(f"{account.paper.source}\n  {account.summary()}; {account.seconds:.1f} s")
     for title, chapter in account.chapters.items():

@@ -14,8 +14,7 @@ from .length_control import LengthControl
 from .open_loop import OpenLoop
 from .planned_references import references
 from .predictive import Predictive
-from .reference import Reference
-from .state import State
+from .state import Reference, State
 from .stops import Stop, longest_stop, stop
 
 __all__ = [

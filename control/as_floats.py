@@ -9,8 +9,7 @@ from ..base.errors import InputError
 from ..base.inputs import FLOAT, float64, required, shown
 from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
-from .reference import Reference
-from .state import State
+from .state import Reference, State
 
 Given = TypeVar("Given", State, Reference)
 

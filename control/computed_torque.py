@@ -27,10 +27,9 @@ from .late_states import LateStates
 from .noise import Noise
 from .one_at_a_time import OneAtATime
 from .records import CABLE, CARRIER, PLATFORM, TURNING
-from .reference import Reference
 from .settings import limits_of, reach_of, set_reach, settings_of
 from .slow_loops import SlowLoops
-from .state import State
+from .state import Reference, State
 from .tension_loop import TensionLoop
 
 TAKE_ALONE = -1  # in place of how tensions are solved: `control_step` then only takes state and reference

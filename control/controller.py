@@ -4,8 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 from .command import Command
-from .reference import Reference
-from .state import State
+from .state import Reference, State
 
 
 class Controller(ABC):

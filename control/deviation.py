@@ -1,7 +1,11 @@
-"""`Deviation`: whether platforms are away from their reference, so far that no step may be called as planned."""
+"""`Deviation`: whether platforms are away from their reference, so far that no step may be called as planned.
+
+So far is also the position error with which a simulation passes by default (`tolerance_of`).
+"""
 
 import numpy as np
 
+from ..base.inputs import number
 from ..models.points import rotations
 from ..models.robot import Robot
 from .command import OFF, PLANNED, SHIFTED
@@ -50,3 +54,13 @@ class Deviation:
         """Return the status of each platform, (N,), from that of its tensions; poses and references are (N, 6)."""
         far = self.are_far(poses, wanted) & ((answered == PLANNED) | (answered == SHIFTED))
         return np.where(far, OFF, answered).astype(np.int8) if far.any() else answered
+
+
+def tolerance_of(robot: Robot, given: float | None) -> float:
+    """Return the given tolerance [m], or by default 50 mm, of small robots 5 % of the mean cable length at home.
+
+    Raises `InputError` if the given one is not a number from 0 to 1e6.
+    """
+    if given is not None:
+        return number("tolerance", given, 0.0, 1e6)
+    return Deviation(robot).most[0]

@@ -18,8 +18,7 @@ from .as_floats import as_floats
 from .command import Command
 from .controller import Controller
 from .predictive import Predictive
-from .reference import Reference
-from .state import State
+from .state import Reference, State
 from .watch import HandOver
 
 NOTICED = 0.6  # of a carrier's weight: force along gravity that nothing explains; lags and noise make 0.4 of it

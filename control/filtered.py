@@ -15,8 +15,7 @@ from .as_floats import as_floats, measured_at
 from .carried_load import CarriedLoad
 from .command import Command
 from .controller import Controller
-from .reference import Reference
-from .state import State
+from .state import Reference, State
 
 SHORT = 1e-5  # [s], in which velocities change by an acceleration
 

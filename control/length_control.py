@@ -22,8 +22,7 @@ from .deviation import Deviation
 from .length_gains import LengthGains
 from .noise import Noise
 from .open_loop import planned_command
-from .reference import Reference
-from .state import State
+from .state import Reference, State
 
 SHARE, STRAIN = 0.05, 0.005  # of the robot's length, and of the longest cable: the default of `most`
 DAMPED = 0.002  # [s]: damping of unknown cables, in terms of their stiffness

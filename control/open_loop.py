@@ -10,8 +10,7 @@ from ..models.robot import Robot
 from .as_floats import as_floats, rows_of
 from .command import HOLD, PLANNED, Command
 from .controller import Controller
-from .reference import Reference
-from .state import State
+from .state import Reference, State
 
 
 class OpenLoop(Controller):

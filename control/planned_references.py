@@ -17,7 +17,7 @@ from ..models.robot import Robot
 from ..models.trajectory import Motion, Trajectory
 from ..solvers import solve_batch
 from ..solvers.in_place import RHO
-from .reference import Reference
+from .state import Reference
 from .trajectory import HasTrajectory, read_trajectory, samples_of
 
 if TYPE_CHECKING:

@@ -25,10 +25,9 @@ from .hand_over import agree
 from .keep_out import Surroundings
 from .noise import Noise
 from .preview import Preview, turns
-from .reference import Reference
 from .settings import reach_of, set_reach
 from .stability import grows
-from .state import State
+from .state import Reference, State
 from .watch import BLIND, KNOWN, LATE, PAUSE, QUICK, UNSTABLE, HandOver, Watch
 from .weights import ripple, stage_at_home, terminal, weights
 

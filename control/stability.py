@@ -10,8 +10,7 @@ from ..plant import Plant
 from ..solvers import TensionSolution
 from .command import OTHERWISE
 from .computed_torque import ComputedTorque
-from .reference import Reference
-from .state import State
+from .state import Reference, State
 
 PERIOD = 2e-3  # [s] between steps
 SLOWEST = 1e-3  # [rad/s]

@@ -12,10 +12,9 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.inputs import number
 from . import film, style
-from .cut_cables import drawn_ends
 from .hull import faces
 from .perspective import Perspective
-from .robot import BODY, POST, box_edges
+from .robot import BODY, POST, box_edges, drawn_ends
 from .scene import Scene
 from .tension_colours import mark, place, scale, shades
 

@@ -1,4 +1,4 @@
-"""Draw curves over one axis, in panels below each other, with their bounds."""
+"""Draw curves: over one axis, in panels below each other, with their bounds; or in space."""
 
 from __future__ import annotations
 
@@ -67,3 +67,14 @@ def curves(
             if missing > 0:
                 ax.set_ylim(low - missing / 2, high + missing / 2)
     return style.legend_below(canvas, *canvas.axes)
+
+
+def curve_in_space(ways: Mapping[str, np.ndarray]) -> style.Figure:
+    """Draw curves (n, 3) [m] with their names and equal scales; a dot marks the start of each."""
+    canvas = style.figure(height=3.3)
+    ax = style.axes_in_space(canvas)
+    for index, (name, points) in enumerate(ways.items()):
+        ax.plot(*points.T, **style.look(index), label=name)
+        ax.plot(*points[0], "o", color=style.colour(index), markersize=4)
+    style.equal_scales(ax, np.concatenate(list(ways.values())))
+    return style.legend_below(canvas, ax)

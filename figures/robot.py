@@ -27,6 +27,7 @@ POST, BODY = "#8a8a8a", "#b4b4b4"
 LETTERS = 6.0  # [points]: numbers and tensions of cables
 # A letter's width and the height of a line [letters].
 LETTER, LINE = 0.58, 1.25
+LEFT = 0.25  # of its length that is drawn of a cable that has been cut
 
 
 def draw(scene: Scene, resting: np.ndarray | None = None) -> style.Figure:
@@ -115,3 +116,14 @@ def box_edges(low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
     """Return the twelve edges of a box, (2, 3) each."""
     corners = np.array([[(low, high)[(i >> k) & 1][k] for k in range(3)] for i in range(8)])
     return [corners[[i, i | 1 << k]] for i in range(8) for k in range(3) if not i >> k & 1]
+
+
+def drawn_ends(anchors: np.ndarray, attachments: np.ndarray, cut: np.ndarray | None) -> np.ndarray:
+    """Return the ends of cables in {G} [m], (..., m, 3) as anchors and attachments are; `cut` is (..., m) or None.
+
+    A cut cable is drawn hanging from its anchor. Its true length depends on where it broke.
+    """
+    if cut is None:
+        return attachments
+    down = np.array([0.0, 0.0, -LEFT]) * np.linalg.norm(attachments - anchors, axis=-1, keepdims=True)
+    return np.where(cut[..., None], anchors + down, attachments)

@@ -9,8 +9,7 @@ import numpy as np
 
 from ..base.display import Displayed, Fact
 from ..base.text import numbered, quantity, quantity_range, quantity_row
-from ..figures.drawing import Drawing
-from ..figures.drawn import Drawn
+from ..figures.drawing import Drawing, Drawn
 from ..figures.report import Part, Report, Reported, Section, Table
 from ..figures.robot import draw
 from ..models import Robot

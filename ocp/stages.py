@@ -20,7 +20,7 @@ from typing import Any
 from ..base.text import quantity
 from .audits.audit import Audit, audit, other_tensions_exist, other_tensions_may_pass
 from .audits.violation import cost, relative_violation
-from .global_path.start import motion_past
+from .global_path.global_path import motion_past
 from .nlp.rows import Mesh
 from .plan import Plan
 from .proofs.durations import Durations, durations

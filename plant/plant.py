@@ -15,9 +15,8 @@ from ..models.dynamics import dynamics_of
 from ..models.files import AnyRobot, as_robot
 from ..models.record import FREE, IMPOSED, RESTS, record_of
 from . import layout
-from .packing import SETTINGS, command_rows, given_or, leading_of, place
+from .packing import SETTINGS, command_rows, complete, given_or, leading_of, place
 from .reading import Reading
-from .samples import complete
 
 DRIVES = {"lengths": layout.LENGTHS, "rates": layout.RATES, "forces": layout.FORCES, "tensions": layout.TENSIONS}
 SHORTEST_STEP, LONGEST_STEP = 1e-12, 1e3  # [s]

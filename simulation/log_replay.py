@@ -18,16 +18,16 @@ from ..base.errors import InputError
 from ..base.inputs import check_ending, file_path, flag, number, one_of
 from ..base.netcdf import Contents, Variable, save_netcdf
 from ..base.text import counted, quantity
+from ..control.deviation import tolerance_of
 from ..estimation.logs.reading import Paths
 from ..estimation.logs.recorded import read_recorded
-from ..figures.drawn import Drawn
+from ..figures.drawing import Drawn
 from ..figures.report import Report, Reported, Section, Table
 from ..models.files import AnyRobot, as_robot
 from ..models.parsing import to_yaml
 from ..models.robot import Robot
 from .explanations import ALONE, Explanation, Matching, tied
 from .replayed_robot import Parameters, changed
-from .tolerance import tolerance_of
 from .windows import Windows
 
 if TYPE_CHECKING:

@@ -7,6 +7,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.inputs import required, shown
 from ..control import Reference
+from ..control.deviation import tolerance_of
 from ..control.noise import Noise
 from ..control.planned_references import references_at
 from ..control.trajectory import read_trajectory
@@ -17,7 +18,6 @@ from .events import Cut
 from .experiment import Experiment
 from .record import Record
 from .simulation import Simulation
-from .tolerance import tolerance_of
 
 UNCONTROLLED = -1  # the status of steps without a controller
 SAME = 1e-6  # of the time between two states

@@ -17,6 +17,7 @@ from ..base.errors import InputError
 from ..base.execution import Execution, ExecutionOptions
 from ..base.inputs import required, shown, whole_number, with_fields
 from ..control import ComputedTorque, Controller, LengthControl, Reference
+from ..control.deviation import tolerance_of
 from ..control.noise import Noise
 from ..control.planned_references import references_at
 from ..control.trajectory import read_trajectory
@@ -39,7 +40,6 @@ from .mismatch import Mismatch
 from .record import Record
 from .runs import fly_many
 from .simulation import Simulation
-from .tolerance import tolerance_of
 from .winds import read_wind
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..base.inputs import file_path
 from ..base.netcdf import Contents
-from ..figures.drawn import Drawn
+from ..figures.drawing import Drawn
 from ..models.motion_file import save_motion
 from ..models.robot import Robot
 

@@ -11,8 +11,7 @@ import xarray as xr
 from towline import load
 from towline.figures import calibration, flight, limits, phase_plane, plan, robot, sweep, workspace
 from towline.figures.convergence import convergence
-from towline.figures.curve_in_space import curve_in_space
-from towline.figures.curves import Panel, curves
+from towline.figures.curves import Panel, curve_in_space, curves
 from towline.figures.envelopes import envelopes
 from towline.figures.metric_map import metric_map
 from towline.figures.scene import Scene

@@ -11,8 +11,7 @@ from towline.models import load
 from towline.ocp import Planner, plan
 from towline.ocp.global_path.at_rest import AtRest
 from towline.ocp.global_path.clear_space import ClearSpace
-from towline.ocp.global_path.end_formations import with_clear_ends
-from towline.ocp.global_path.global_path import find_global_path
+from towline.ocp.global_path.global_path import find_global_path, with_clear_ends
 from towline.ocp.global_path.need import guess_exceeds, is_open
 from towline.ocp.global_path.space import Space
 from towline.ocp.nlp.guess import usual_guess

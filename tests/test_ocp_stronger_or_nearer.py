@@ -7,9 +7,8 @@ from towline import Robot, Task, load, plan, tensions
 from towline.ocp.planner import Planner
 from towline.ocp.reports.report import sections
 from towline.ocp.search.largest_share import largest_share
-from towline.ocp.search.other_paths import other_yaws
+from towline.ocp.search.other_paths import other_yaws, shifted
 from towline.ocp.search.search import Search
-from towline.ocp.tasks.paths.shifted import shifted
 
 WAYS = {
     "beyond the frame": ("cogiro", [0, 0, 2], [9, 0, 2], {}),

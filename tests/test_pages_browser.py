@@ -9,7 +9,7 @@ import pytest
 from towline.figures import page as html
 from towline.figures import style
 from towline.figures.drawing import Drawing
-from towline.studies.accounts import page as accounts
+from towline.studies.accounts import files as accounts
 from towline.studies.accounts.account import Account, Chapter, Paper
 from towline.studies.accounts.claim import Claim, Verdict
 

@@ -16,9 +16,7 @@ from towline.figures.drawing import Drawing
 from towline.models import Dynamics, load
 from towline.studies.accounts.account import Chapter, Paper, gather
 from towline.studies.accounts.claim import Statement, Verdict, statements, value_text
-from towline.studies.accounts.errata import errata
-from towline.studies.accounts.files import write
-from towline.studies.accounts.page import page
+from towline.studies.accounts.files import errata, page, write
 from towline.studies.flying import (
     balance,
     cable,

@@ -11,7 +11,7 @@ from ruamel.yaml import YAML
 
 from towline import load, simulate
 from towline.cli.new import TEMPLATES
-from towline.figures.cut_cables import drawn_ends
+from towline.figures.robot import drawn_ends
 from towline.models import Robot
 from towline.statics.scene import scene
 from towline.viewer import read

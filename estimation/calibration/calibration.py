@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ...base.display import Fact
 from ...base.errors import InputError
-from ...figures.drawn import Drawn
+from ...figures.drawing import Drawn
 from ...figures.report import Report, Reported
 from .report import facts, headline, report
 from .result import CalibrationData

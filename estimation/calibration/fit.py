@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .model import Model, State
-from .normal_equations import Diagonals, NormalEquations, metric
-from .settling import settled
+from .normal_equations import Diagonals, NormalEquations, metric, pose_steps
 
 MOST_STEPS = 150
 NEGLIGIBLE = 1e-8  # decrease of the sum of squares relative to 1 + the sum: parameters move by 1e-4 of their sigmas
@@ -24,6 +23,8 @@ LEAST, LARGEST = 1e-9, 1e12  # of the damping's factor, where it is not zero
 GOOD = 0.75  # ratio of a step's decrease to the expected one
 FARTHEST = 0.5  # of the cables' length: beyond that derivatives mean nothing, unless nothing is to be gained
 RELATIVE = 1e-13  # of an eigenvalue to the largest, below which it is rounding
+MOST_POSE_STEPS = 10
+SHORTER = 0.25  # of the last step of a pose that fitted worse
 
 
 class Fit(NamedTuple):
@@ -161,3 +162,22 @@ def _step(
     values, vectors = np.linalg.eigh(equations.S)
     fixed = values > unobservable_below(values, length)
     return dp, float(((vectors.T @ b)[fixed] ** 2 / values[fixed]).sum()) + of_poses
+
+
+def settled(model: Model, state: State, negligible: float) -> State:
+    """Return the state with better poses and the same parameters; each pose has a step length of its own.
+
+    It ends where the decrease of each sample's sum of squares is negligible.
+    """
+    share = np.ones(len(state.shift))
+    for _ in range(MOST_POSE_STEPS):
+        dq, expected, before = pose_steps(model, state)
+        moves = expected > negligible
+        if not moves.any():
+            break
+        tried = model.moved(state, np.zeros_like(state.x), np.where(moves, share, 0.0)[:, None] * dq)
+        after = model.residuals(tried).of_samples
+        better = after <= before
+        share = np.where(better, 1.0, SHORTER * share)
+        state = State(state.x, *(np.where(better, a.T, b.T).T for a, b in zip(tried[1:], state[1:], strict=True)))
+    return state

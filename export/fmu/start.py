@@ -6,8 +6,7 @@ import numpy as np
 
 from ...control.computed_torque import ComputedTorque
 from ...control.fallback import CARRIED
-from ...control.reference import Reference
-from ...control.state import State
+from ...control.state import Reference, State
 from ...core import sense
 from ...models.record import record_of
 from ...models.robot import Robot

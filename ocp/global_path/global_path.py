@@ -1,4 +1,4 @@
-"""`find_global_path`: a path past obstacles from the start of a motion to its end, from which the program starts.
+"""`motion_past`: a motion past obstacles, from which the program starts; `find_global_path`: the path of it.
 
 A nonlinear program that starts inside an obstacle, or on its wrong side, stays there. Where the usual guess exceeds a
 limit at rest (`need`), two trees of configurations grow from start and end (`tree`), over the platform's coordinates
@@ -7,28 +7,31 @@ kept by a reserve (`at_rest`). A straight piece between two is clear if no dista
 configurations that are checked (`clear_space`). Motion is left to the program.
 
 In a narrow gap hardly any formation is clear, and trees that change position and formation together rarely find the way
-to it. A formation that passes the gap is found there; with it, only positions are searched.
+to it. A formation that passes the gap is found there; with it, only positions are searched. A formation that starts at
+home may stand in the way of an obstacle, although its task lets it start with any other. So may a platform with the
+attitude of its path (`with_clear_ends`).
 """
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.random import Generator
 
 from ...base.display import Displayed
 from ...base.text import quantity
-from ..nlp.guess import guess_through
+from ..nlp.guess import formation_guess, guess_through, usual_guess
+from ..search.search import Search
 from ..tasks.deviation import Deviation
+from ..tasks.ends import carrier_ends, fixed_values
 from ..tasks.paths.rest_to_rest import rest_to_rest
-from ..tasks.scenario import Scenario
+from ..tasks.scenario import ATTITUDE, Scenario
 from .at_rest import AtRest
-from .clear_space import ClearSpace
-from .end_formations import with_clear_ends
-from .need import STILL, limit_name
-from .smoothing import rounded, shortened
+from .clear_space import FORMATIONS, ClearSpace, grown
+from .need import STILL, guess_exceeds, is_open, limit_name
 from .space import Space
 from .tree import connect
 
@@ -40,6 +43,14 @@ TREES_OF_TEAM = 20_000  # configurations after which the search of a team restar
 AGAIN = 1.0  # of what the first path took: what is spent on a shorter one, past other sides of obstacles
 PEAK_SPEED, PEAK_ACCELERATION = 2.2, 7.6  # of the law from rest to rest over a unit of length in a unit of time
 ON_THE_WAY, IN_PLACE = 3_000, 2_000  # configurations for one formation's way, and for its change at an end
+SHORTCUTS = 150
+ROUNDS = 2  # of cutting corners
+CUT = 0.25  # of the two sides of a corner
+YAW = 5
+MOST_TURN = 0.4  # [rad], by which the platform starts or ends turned
+SPARE = 2.0  # times the reserve, which is kept if there is space
+AWAY = 0.02  # metres of slack that a metre away from the usual formation is worth
+GLOBAL_SHARE = 0.2  # of the time limit
 
 
 @dataclass(frozen=True)
@@ -163,3 +174,128 @@ def _formations(clear: ClearSpace, rng: Generator, at: np.ndarray) -> Iterator[n
         target = at.copy()
         target[clear.space.groups[-1]] = clear.space.sample_shape(rng)
         yield target
+
+
+def shortened(path: np.ndarray, clear: ClearSpace, rng: Generator) -> np.ndarray:
+    """Return a path with straight pieces instead of detours, wherever random places of it can be joined.
+
+    A group of coordinates is made straight at once, while the others stay as they are.
+    """
+    scale, groups = clear.space.scale, clear.space.groups
+    for _ in range(SHORTCUTS):
+        if len(path) < 3 or not clear.in_time:
+            break
+        at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0) * scale, axis=1))])
+        ends = np.sort(rng.uniform(0.0, at[-1], 2))
+        group = groups[rng.integers(len(groups))]
+        i, j = np.searchsorted(at, ends, side="right")
+        if i == j or ends[0] == ends[1]:
+            continue
+        p, q = (np.array([np.interp(place, at, column) for column in path.T]) for place in ends)
+        piece = np.vstack([p, *([] if group.all() else path[i:j]), q])
+        share = (np.r_[ends[0], at[i:j] if len(piece) > 2 else [], ends[1]] - ends[0]) / (ends[1] - ends[0])
+        piece[:, group] = p[group] + share[:, None] * (q - p)[group]
+        if clear.is_clear(piece):
+            path = _without_idle(np.vstack([path[:i], piece, path[j:]]), scale)
+    return path
+
+
+def _without_idle(path: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Return a path without the places between which it goes straight on."""
+    kept = [path[0]]
+    for place, after in pairwise(path[1:]):
+        there, on = (place - kept[-1]) * scale, (after - kept[-1]) * scale
+        along = there @ on / max(on @ on, 1e-300)
+        if not (0.0 <= along <= 1.0 and np.linalg.norm(there - along * on) < 1e-9):
+            kept.append(place)
+    return np.vstack([*kept, path[-1]])
+
+
+def rounded(path: np.ndarray, clear: ClearSpace) -> np.ndarray:
+    """Return a path whose corners are cut where that is possible, again and again (Chaikin)."""
+    for _ in range(ROUNDS):
+        new = [path[0]]
+        for before, corner, after in zip(path[:-2], path[1:-1], path[2:], strict=True):
+            p, q = corner + CUT * (before - corner), corner + CUT * (after - corner)
+            new += [p, q] if clear.is_clear(np.stack([p, q])) else [corner]
+        path = np.vstack([*new, path[-1]])
+    return path
+
+
+def with_clear_ends(space: Space, rest: AtRest, reserve: float) -> Space:
+    """Return the space with ends near the usual ones that keep all limits by the reserve [m], if they are found."""
+    if carrier_ends(space.scenario.task) == "periodic":
+        return space
+    rng, ends = np.random.default_rng(0), space.ends.copy()
+    for k, slack in enumerate(rest(*space.poses(ends)).slack):
+        free = _free(space, k)
+        if slack < reserve and free is not None:
+            ends[k] = _clear_end(space, rest, ends[k], free, reserve, rng)
+    return replace(space, given_ends=ends)
+
+
+def _free(space: Space, end: int) -> np.ndarray | None:
+    """Return by how much each coordinate may change at an end, (count,); None if its formation may not."""
+    scenario, platform = space.scenario, space.scenario.platform_free
+    fixed = {each.column for each in fixed_values(scenario) if each.order == 0 and each.end == -end}
+    owners = scenario.owners()
+    if any(owners[column][0] is not None for column in fixed):
+        return None
+    free = np.zeros(space.count)
+    free[len(platform) :] = np.inf if space.shaped else 0.0
+    turning = (YAW,) if space.shaped else ATTITUDE  # a formation carries its load level
+    for column, coordinate in enumerate(platform):
+        if coordinate in turning and column not in fixed:
+            free[column] = min(scenario.task.tube.turn, MOST_TURN)
+    return free if free.any() else None
+
+
+def _clear_end(
+    space: Space, rest: AtRest, end: np.ndarray, free: np.ndarray, reserve: float, rng: np.random.Generator
+) -> np.ndarray:
+    """Return the configuration nearest to `end` that keeps the reserve, or the one that misses it by least."""
+
+    def inside(tried: np.ndarray) -> np.ndarray:
+        return np.clip(tried, end - free, end + free)
+
+    def score(tried: np.ndarray) -> np.ndarray:
+        slack = rest(*space.poses(inside(tried))).slack
+        away = np.linalg.norm((inside(tried) - end) * space.scale, axis=1)
+        return np.minimum(slack, SPARE * reserve) - np.where(slack >= reserve, AWAY * away, AWAY * space.size)
+
+    formation = np.isinf(free)
+    first = np.repeat(end[None], FORMATIONS, axis=0)
+    first[1:] += rng.uniform(-1.0, 1.0, first[1:].shape) * np.where(formation, 0.0, free)
+    if formation.any():
+        first[1:, formation] = [space.sample_shape(rng) for _ in range(FORMATIONS - 1)]
+    return inside(grown(space, first, score, np.minimum(free, 1.0), rng)[0])
+
+
+def motion_past(search: Search, balance: bool) -> tuple[Deviation | None, bool]:
+    """Return a motion past what the usual guess collides with, or the best guess, and whether it collides at all.
+
+    None is the usual guess where no formation is better.
+
+    With `balance` a configuration without tensions at rest is a collision.
+    """
+    scenario = search.scenario
+    if scenario.count == 0 or not is_open(scenario):
+        return None, False
+    with search.stage("global path") as stage:
+        usual = partial(usual_guess, scenario)
+        exceeded = guess_exceeds(scenario, usual, balance)
+        nodes = np.linspace(0.0, scenario.duration, scenario.task.steps + 1)
+        formation = formation_guess(scenario) if search.seconds_left > 0 else None
+        clear = formation is not None and not guess_exceeds(scenario, formation, balance)
+        if not exceeded:
+            # A formation keeps more distance, but not between the places at which it was chosen.
+            return None if formation is None else (formation if clear else usual)(nodes), False
+        if formation is not None and clear:
+            stage.message = f"the direct motion exceeds {exceeded}: a shifted or turned one keeps all limits"
+            return formation(nodes), True
+        seconds = min(GLOBAL_SHARE * scenario.task.time_limit, search.seconds_left)
+        path, message = find_global_path(scenario, seconds)
+        stage.message = f"the direct motion exceeds {exceeded}: {message}"
+        if path is not None:
+            return path.guess(scenario), True
+        return None if formation is None else formation(nodes), True

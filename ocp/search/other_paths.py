@@ -1,5 +1,8 @@
 """What path near a task's own is feasible: a nearer end, a smaller or shifted path, other yaws."""
 
+from collections.abc import Callable
+from typing import Any, TypeVar
+
 import numpy as np
 
 from ...base.text import quantity, quantity_row
@@ -9,7 +12,7 @@ from ..global_path.at_rest import AtRest
 from ..global_path.shortest_shifts import shortest_shifts
 from ..result import Relaxed
 from ..tasks.paths import CirclePath, FeedPath, LinePath, WaypointPath
-from ..tasks.paths.shifted import shifted, shrunk
+from ..tasks.paths.base import PathBase
 from ..tasks.scenario import Scenario
 from .largest_share import RESERVES, Change, Variation, along
 from .relaxations import planned, rounded
@@ -18,6 +21,8 @@ from .search import Search
 LEAST = 0.05  # of a path: with less, other changes are better advice
 PLACES = 31  # of a path, at which a shifted one is compared
 YAWS = np.deg2rad(np.arange(-180, 180, 5))  # that are tried
+POINT, POINTS, PATHS = ("start", "end", "pose", "centre"), ("points", "poses"), ("path", "along")
+AnyKind = TypeVar("AnyKind", bound=PathBase)
 
 
 def nearer_end(scenario: Scenario) -> Change | None:
@@ -147,3 +152,34 @@ def _margins_at_yaws(scenario: Scenario, points: np.ndarray, yaws: np.ndarray) -
     A = scaled(scenario, scenario.dynamics.wrench_matrix(poses, carriers))[:, axes]
     w = scaled(scenario, scenario.dynamics.required_wrench(poses, still, still, wind=scenario.wind))[:, axes]
     return margins(A, w, *scenario.bounds()).reshape(yaws.shape)
+
+
+def shifted(path: AnyKind, by: np.ndarray) -> AnyKind:
+    """Return the path moved by (3,) [m] along the axes of its frame, without turning it."""
+    return path.__class__.model_validate(_moved(path.model_dump(), lambda point: [*(point[:3] + by), *point[3:]]))
+
+
+def shrunk(path: AnyKind, towards: np.ndarray, share: float) -> AnyKind:
+    """Return the path whose poses, and the radius of a circle, have this share of their distances from a pose (6,)."""
+
+    def nearer(point: np.ndarray) -> list[float]:
+        there = towards[: len(point)]
+        return list(there + share * (point - there))
+
+    fields = _moved(path.model_dump(), nearer)
+    return path.__class__.model_validate(fields | ({"radius": share * fields["radius"]} if "radius" in fields else {}))
+
+
+def _moved(fields: dict[str, Any], move: Callable[[np.ndarray], list[float]]) -> dict[str, Any]:
+    """Return the fields of a path with all its positions or poses moved, those of paths inside it too."""
+    moved = dict(fields)
+    for name, value in fields.items():
+        if name in POINT and isinstance(value, list | tuple):  # the start of a path that returns is a time
+            moved[name] = move(np.array(value))
+        elif name in POINTS:
+            moved[name] = [move(np.array(point)) for point in value]
+        elif name in PATHS:
+            moved[name] = _moved(value, move)
+        elif name == "parts":
+            moved[name] = [part | {"path": _moved(part["path"], move)} for part in value]
+    return moved

@@ -1,4 +1,4 @@
-"""What else would make a motion feasible: another path (`other_paths`), less wind or mass, other cables."""
+"""What else would make a motion feasible: another path (`other_paths`), less wind or mass, other cables, a tube."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,19 +18,20 @@ from ..result import Relaxed
 from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out, with_task
 from ..tasks.phase import Load
-from ..tasks.scenario import Scenario
+from ..tasks.scenario import ATTITUDE, Scenario
 from ..tasks.status import MotionStatus
 from ..tasks.task import Tube
 from ..tasks.wind_set import WindBox, WindDisc
 from .largest_share import Change, Variation, by_programs, exceeds, largest_share, together
 from .other_paths import near_home, nearer_end, other_yaws, shifted_path, smaller_circle
 from .past_regions import IN_THE_WAY, past_regions
-from .relaxations import LONGER, longer_durations, near_motion, other_duration, planned, rounded, slower
+from .relaxations import BEYOND, LONGER, longer_durations, near_motion, other_duration, planned, rounded, slower, solved
 from .search import Search
 from .slower import longer, longer_phases, slower_rate, slower_states
-from .wider_tube import as_wide_as_states, tilting_platform
 
 STRONGEST = 100.0  # times t_max: a motion that needs more is not one that stronger cables make feasible
+MOST = 0.5  # [rad], of a tilt that is offered
+SPARE = 1.01  # times the largest tilt at the nodes
 
 
 def near_chosen_motion(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> list[Relaxed]:
@@ -275,3 +276,40 @@ TOGETHER = (
     *(slower_rate, longer),
 )
 BY_PROGRAMS = _less_wind, _lighter_load, _lighter_platform, nearer_end
+
+
+def as_wide_as_states(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
+    """Return the radius of the tube that reaches the given state farthest outside it."""
+    tube = scenario.task.tube
+    off = max((excess.value for excess in audit.excess if excess.limit == "tube.position"), default=0.0)
+    if off <= tube.radius:
+        return []
+    radius = rounded((1 + BEYOND) * off, up=True)
+    plan = planned(search, _with_tube(scenario, position=radius), "audit, wider tube")
+    return [] if plan is None else [Relaxed("tube.position", "m", tube.radius, radius, plan)]
+
+
+def tilting_platform(search: Search, scenario: Scenario) -> list[Relaxed]:
+    """Return the tube in which the platform must be allowed to tilt, so that few cables can hold it on its path.
+
+    Cables fewer than the degrees of freedom balance the weight in few attitudes, which change from place to place.
+    """
+    task, robot = scenario.task, scenario.robot
+    angles = [axis for axis in ATTITUDE if robot.dof_mask[axis]]
+    if task.tube.turn or task.phases is not None or not angles or robot.m >= robot.dof_mask.sum():
+        return []
+    free = _with_tube(scenario, attitude=MOST)
+    outcome = solved(search, free, None)
+    if outcome is None:
+        return []
+    turns = [column for column, (owner, axis) in enumerate(free.owners()) if owner is None and axis in angles]
+    tilt = min(rounded(SPARE * float(np.abs(outcome.deviation.q[:, turns]).max()), up=True), MOST)
+    if not tilt:
+        return []
+    tilting = _with_tube(scenario, attitude=tilt)
+    plan = planned(search, tilting, "audit, tilting platform", outcome.deviation)
+    return [] if plan is None else [Relaxed("tube.attitude", "rad", task.tube.turn, tilt, plan, "about each axis")]
+
+
+def _with_tube(scenario: Scenario, **changes: float) -> Scenario:
+    return with_task(scenario, tube=scenario.task.tube.model_copy(update=changes))

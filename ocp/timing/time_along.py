@@ -26,11 +26,21 @@ from ..plan import Plan
 from ..tasks.carrier_paths import carrier_paths
 from ..tasks.lay_out import lay_out
 from ..tasks.limit_list import limit_list
-from ..tasks.paths import CirclePath
+from ..tasks.paths import (
+    AnyPath,
+    CirclePath,
+    Curve,
+    FeedPath,
+    LinePath,
+    ReturnPath,
+    SamplePath,
+    SequencePath,
+    TimedPath,
+    WaypointPath,
+)
 from ..tasks.status import MotionStatus
 from ..tasks.task import GivenBase, Task, read_task
 from .fastest_law import FastestLaw
-from .geometry import geometry
 from .parametrised_path import ParametrisedPath, PathLimits
 from .phase_plane import PhasePlane, phase_plane, proofs
 from .timed_task import ACCELERATIONS, KNOWN_LIMITS, SPEEDS, check_task
@@ -45,6 +55,9 @@ COARSE = 4e-3  # of the weight: if more is missing it takes a finer grid, if les
 RISE = 2.5  # times 1 / intervals: change of the logarithm of a zone's bound from point to point
 CLOSEST = 1e-3  # of a step of a grid: points that are nearer to each other are one
 COARSE_EXCESS = 1e-4  # of a limit: if it is exceeded by more it takes a finer grid, if by less some distance everywhere
+PIECES = (400, 800, 1600)  # of a spline through points of a path, until it is near enough
+LOOKS = 20_001
+ON_PATH = 2e-6  # of a path's length: how far that spline may be off
 
 
 def time_along(robot: AnyRobot, task: Task | dict[str, Any] | str | os.PathLike[str], *, grid: int = 200) -> Plan:
@@ -286,3 +299,52 @@ def _toppra() -> tuple[Any, Any]:
             "time_along: toppra is not installed; install the extra timing: pip install 'towline[timing]'"
         ) from None
     return fastest, Rows
+
+
+def geometry(path: AnyPath, *, alone: bool) -> Curve:
+    """Return the curve of a path; `alone` if no other path is followed with the same s.
+
+    Raises `InputError` if a spline or samples turn so sharply that they must rest, or move nowhere, or for a
+    sequence, a return or a feed.
+    """
+    if isinstance(path, SequencePath):
+        raise InputError("path.kind must not be sequence to time a path; time its parts one by one")
+    if isinstance(path, FeedPath):
+        raise InputError("path.kind must not be feed to time a path, since it has its own speed; plan it instead")
+    if isinstance(path, ReturnPath):
+        raise InputError("path.kind must not be return to time a path; time the whole path instead")
+    if isinstance(path, TimedPath):
+        return path.along
+    if isinstance(path, LinePath):
+        return path.model_copy(update={"timing": "uniform"})
+    if isinstance(path, WaypointPath) and path.shape == "spline" and (alone or path.times is None):
+        return _by_length(path)
+    return _by_length(path) if isinstance(path, SamplePath) and alone else path
+
+
+def _by_length(path: WaypointPath | SamplePath) -> SamplePath:
+    """Return a spline by length through many points of a path, densest at its ends."""
+    shares = np.linspace(0.0, 1.0, LOOKS)
+    looks = path.by_fraction(shares).pose
+    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(looks, axis=0), axis=1)))
+    smooth = f"path of kind {path.kind} must rest nowhere between its ends to be timed, and not turn at once"
+    if not length[-1] > 0:
+        raise InputError(f"{smooth}, got one that moves nowhere")
+    worst = np.zeros(6)
+    for pieces in PIECES:
+        targets = length[-1] * (1 - np.cos(np.pi * np.arange(pieces + 1) / pieces)) / 2
+        at = np.interp(targets, length, shares)
+        at[[0, -1]] = 0.0, 1.0
+        poses = tuple((x, y, z, roll, pitch, yaw) for x, y, z, roll, pitch, yaw in path.by_fraction(at).pose.tolist())
+        times = tuple((targets / length[-1]).tolist())
+        spline = SamplePath(kind="samples", frame=path.frame, times=times, poses=poses)
+        # Between the points only the deviation across the path matters: the time law decides where along it.
+        between = (targets[1:] + targets[:-1]) / 2
+        target, along, _ = path.by_fraction(np.interp(between, length, shares))
+        along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), np.finfo(float).tiny)
+        off = spline.by_fraction(between / length[-1]).pose - target
+        across = np.linalg.norm(off - np.sum(off * along, axis=1, keepdims=True) * along, axis=1)
+        if across.max() <= ON_PATH * length[-1]:
+            return spline
+        worst = target[int(across.argmax())]
+    raise InputError(f"{smooth}, got one that does near ({', '.join(f'{value:.3g}' for value in worst[:3])}) m")

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from ...figures.curve_in_space import curve_in_space
-from ...figures.curves import Panel, curves
+from ...figures.curves import Panel, curve_in_space, curves
 from ...figures.drawing import Drawing
 from ...models import Dynamics, load
 from ...ocp.tasks.paths import Motion

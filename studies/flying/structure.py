@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ...figures.curve_in_space import curve_in_space
+from ...figures.curves import curve_in_space
 from ...figures.drawing import Drawing
 from ...figures.robot import draw
 from ...models import Dynamics, load

@@ -15,9 +15,8 @@ from .line import LinePath
 from .motion import Motion
 from .rest import RestPath
 from .samples import SamplePath
-from .smoothed_law import SmoothedLaw
 from .stations import Stations
-from .time_law import TimeLaw
+from .time_law import SmoothedLaw, TimeLaw
 from .waypoints import WaypointPath
 
 Curve: TypeAlias = Annotated[RestPath | LinePath | CirclePath | WaypointPath | SamplePath, Field(discriminator="kind")]
