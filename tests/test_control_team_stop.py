@@ -9,6 +9,7 @@ from towline import Dynamics, InputError, Robot, load, plan, simulate
 from towline.control import ComputedTorque, Predictive, longest_stop, references, stop
 from towline.control.planned_references import planned
 from towline.models import points
+from towline.models.trajectory import Trajectory
 from towline.statics.continuation import continued
 from towline.statics.team_stops import team_stop_along
 
@@ -102,6 +103,20 @@ def test_a_stop_that_begins_before_the_end_of_a_plan_and_goes_beyond_it_is_feasi
     x, h = its.carriers[0][..., :3], its.times[1]
     bends = np.linalg.norm(np.diff(x, 2, axis=0), axis=-1) / h**2
     assert bends.max() < 1.05 * robot.carriers[0].motion_limits.acceleration
+
+
+def test_noise_of_accelerations_is_not_extrapolated():
+    """Of 0.05 m/s^2 at 0.5 m/s: differences over a millisecond would make it a jerk of 200 m/s^3."""
+
+    def at(times):
+        noise = 0.05 * np.cos(np.pi * np.round(1e3 * times))[:, None] * np.eye(6)[0]
+        return (0.5 * times[:, None] * np.eye(6)[0], np.full((len(times), 1), 0.5) * np.eye(6)[0], noise), (
+            np.zeros((3, len(times), 1, 6))
+        )
+
+    trajectory = Trajectory(1.0, at)
+    *_, acceleration = continued(trajectory, together=False).at(np.linspace(1, 3, 201))[0]
+    assert np.abs(acceleration).max() < 3
 
 
 @pytest.mark.parametrize("together", [True, False])

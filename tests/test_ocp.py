@@ -493,6 +493,21 @@ def test_audit_sees_between_the_nodes():
     assert plan(robot, task).status is MotionStatus.INFEASIBLE
 
 
+def test_audits_of_long_motions_see_a_jerk_of_a_few_milliseconds(monkeypatch):
+    """With instants 10 ms apart, as of motions that last 2000 s, and accelerations by 25 samples a ms."""
+    monkeypatch.setattr("towline.ocp.audits.audit.MANY_SAMPLES", 0)
+    robot, start = load("cogiro"), 10.0033  # [s]
+    points = [robot.home[:3] + offset for offset in ([0, 0, 0], [0.5, 0, 0], [0.5, 0, 1e-4], [0, 0.5, 0.2])]
+    path = {"kind": "waypoints", "points": np.array(points).tolist(), "times": [0, start, start + 8e-3, 20]}
+    task = {"path": path, "duration": 20, "limits": {"platform_acceleration": 5}, "output_rate": 10}
+    scenario = lay_out(robot, read_task(task))
+    seen = audit(scenario, None)
+    assert 2000 <= np.count_nonzero(np.diff(seen.times) > 9e-3) + 20 < 2021
+    (excess,) = (each for each in seen.excess if each.limit == "platform_acceleration")
+    during = scenario.motion(np.linspace(start, start + 8e-3, 201), None)[0].acceleration[:, :3]
+    assert excess.value == pytest.approx(np.linalg.norm(during, axis=1).max(), rel=2e-3)
+
+
 def test_audit_sees_carriers_out_of_their_limits(circle_free):
     scenario = circle_free.scenario
     good = circle_free.deviation

@@ -9,6 +9,8 @@ from towline import InputError, Robot, load
 from towline.estimation import pose_from_lengths
 from towline.estimation.calibration import Measurements, calibrate
 from towline.estimation.logs.encoders import lengths_of, readings_of
+from towline.estimation.pose.parameter_errors import length_errors
+from towline.estimation.pose.residual_tests import squares_of
 from towline.models import Dynamics, Uncertainty, points
 from towline.statics.robust import uncertainty_of
 
@@ -117,3 +119,19 @@ def test_the_uncertainty_moves_poses_at_rest(name):
     np.testing.assert_allclose(
         (found.covariance - found.covariance_of_noise)[finite], expected[finite], atol=1e-3 * expected.max()
     )
+
+
+@pytest.mark.parametrize("name", ["caroca-pulleys", "planar-4"])
+def test_squared_residuals_are_the_least_of_all_poses(name):
+    """Of linearised lengths, by least squares in the metric of all errors; other poses do not change them."""
+    robot = uncertain(name, {"anchor.x": 3e-3, "anchor.z": 1e-4, "attachment.x": 5e-4, "encoder.offset": 1e-3})
+    sigma, draw, free = np.linspace(1e-3, 4e-3, robot.m), np.random.default_rng(4), robot.dof_mask > 0
+    pose, residuals = robot.home[None], 5e-3 * draw.normal(size=(1, robot.m))
+    lengths = Dynamics(robot).cable_lengths(pose) - residuals
+    L, J = length_errors(robot, pose, lengths, robot.carrier_home)
+    root = np.linalg.inv(np.linalg.cholesky(np.diag(sigma**2) + L[0] @ robot.uncertainty.matrix @ L[0].T))
+    least = np.linalg.lstsq(root @ J[0][:, free], root @ residuals[0], rcond=None)[1]
+    found = squares_of(robot, pose, residuals, sigma, robot.carrier_home)
+    np.testing.assert_allclose(found, least, rtol=1e-6)
+    shifted = residuals + 1e-3 * J[0][:, free].sum(axis=1)
+    np.testing.assert_allclose(squares_of(robot, pose, shifted, sigma, robot.carrier_home), least, rtol=1e-3)

@@ -525,6 +525,8 @@ def test_it_is_slow_near_a_place(through, planned):
     assert speed[inside].max() <= 0.4 * (1 + 1e-3)
     assert speed[inside].mean() > 0.38
     assert speed.max() > 1
+    if not planned:
+        assert len(found.law.s) < 1000  # a fine grid only where the bound rises, not 3201 points
 
 
 def test_it_brakes_to_the_edge_of_a_slow_zone():
@@ -539,8 +541,6 @@ def test_it_brakes_to_the_edge_of_a_slow_zone():
         peak = np.sqrt(most * way + slow**2 / 2)
         seconds += (2 * peak - slow) / most
     assert law.duration == pytest.approx(seconds, rel=1e-3)
-    assert law.law is not None
-    assert len(law.law.s) < 2000  # a fine grid only where the bound rises
 
 
 @pytest.mark.parametrize(

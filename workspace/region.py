@@ -64,7 +64,8 @@ def surrounding_box(robot: Robot, carriers: dict[str, Box]) -> tuple[np.ndarray,
     every = np.vstack(corners)
     low, high = every.min(axis=0), every.max(axis=0)
     # There is space above and below the anchors too. Across gravity, cables that all pull to one side balance nothing.
-    beside = np.where(robot.gravity, np.inf, 2 * np.linalg.norm(robot.attachments, axis=1).max())
+    reach = np.linalg.norm(robot.attachments, axis=1) + 2 * robot.pulley_radii  # from anchors
+    beside = np.where(robot.gravity, np.inf, 2 * reach.max())
     spread = np.maximum(high - low, np.minimum(0.5 * (high - low).max(), high - low + beside))
     low = np.minimum(low, (low + high - spread) / 2)
     moving = robot.dof_mask[:3] > 0

@@ -82,20 +82,16 @@ class Cycle:
         self._low, self._high = (bound / robot.force_scale for bound in scenario.bounds())
         self._inertia = robot.platform.mass / robot.force_scale * (PLACES / FEW / scenario.duration) ** 2
         self._force = robot.platform.mass / robot.force_scale * np.array(robot.gravity)
-        self._length, free = robot.length, robot.dof_mask > 0
-        # The force of a guide has no moment about an axis that is parallel to it.
-        turns = free[3:] & np.roll(free[:3], -1) & np.roll(free[:3], -2)
-        self._rows = np.flatnonzero(np.append(free[:3], turns))
+        # Guides are parallel to the axes about which a platform turns, so they have no moments about these.
+        self._length, self._rows = robot.length, np.flatnonzero(robot.dof_mask)
         self.half = half = np.zeros(6)
         half[list(scenario.platform_free)] = [
             tube.turn if i in ATTITUDE else tube.radius for i in scenario.platform_free
         ]
         signs = np.stack(np.meshgrid(*[[-1.0, 1.0] if each else [0.0] for each in half]), axis=-1).reshape(-1, 6)
         self.corners, body = len(signs), np.vstack([robot.attachments, robot.platform.com])
-        middle, points = (
-            placed(motion.pose, body),
-            placed(motion.pose[:, None] + signs * half, body),
-        )  # (n, k, m + 1, 3)
+        middle = placed(motion.pose, body)
+        points = placed(motion.pose[:, None] + signs * half, body)  # (n, k, m + 1, 3)
         anchors = scenario.dynamics.points(motion.pose[:1], carriers.pose[:1])[0][0]
         self._com = middle[:, -1] - middle[:, -1].mean(axis=0)
         self._balanced = not (half[3:].any() or motion.velocity[:, 3:].any())

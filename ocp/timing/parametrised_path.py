@@ -135,7 +135,7 @@ class ParametrisedPath:
         Between two points of a grid the square of the speed is linear in s, and may exceed a bound that is not.
         """
         s = np.linspace(0.0, 1.0, FINE * LOOKS)
-        changed = np.cumsum(np.abs(np.diff(np.log(self._bound(zone, s)), prepend=np.nan)[1:]) / share)
+        changed = np.cumsum(np.abs(np.diff(np.log(self._bound(zone, s)))) / share)
         return np.interp(np.arange(1.0, changed[-1]), changed, s[1:])
 
     def _bound(self, zone: ZoneSpeed, s: np.ndarray) -> np.ndarray:
