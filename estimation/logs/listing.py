@@ -25,11 +25,9 @@ def listing(recordings: Sequence[Recording], given: LogMap | None = None, robot:
     """
     moving = [] if robot is None else [carrier.name for carrier in robot.carriers if carrier.moves]
     others: dict[str, list[str]] = {}
+    problem = None
     try:
-        found, problem = (
-            fields_of(recordings, given, None if robot is None else robot.m, moving, free_axes(robot)),
-            None,
-        )
+        found = fields_of(recordings, given, None if robot is None else robot.m, moving, free_axes(robot))
         for name in moving:
             of = carrier_fields(recordings, given, name)
             others[name] = [one.label for one in (*of.position, *of.orientation, *of.thrusts, *of.directions)]
