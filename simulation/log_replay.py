@@ -27,7 +27,7 @@ from ..models.files import AnyRobot, as_robot
 from ..models.parsing import to_yaml
 from ..models.robot import Robot
 from .explanations import ALONE, Explanation, Matching, tied
-from .replayed_robot import Parameters, changed
+from .replayed_robot import Parameters, changed, friction_of
 from .windows import Windows
 
 if TYPE_CHECKING:
@@ -126,8 +126,9 @@ class Replay(Drawn, Reported, Displayed):
         file, fitted = self.windows.recorded.robot, self.fitted
         if fitted is None:
             return file
-        # Friction of a robot without models of winches and stiffness that was assumed have no place in a file.
-        return changed(file, fitted if self.windows.drive == "forces" else fitted._replace(friction=0.0))
+        # Friction that drives compensate is another, and friction without a model of winches has no place in a file.
+        felt = self.windows.drive == "forces"
+        return changed(file, fitted if felt else fitted._replace(friction=friction_of(file)))
 
     @property
     def refused(self) -> str | None:
@@ -298,8 +299,8 @@ def replay(
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
         log, poses, fields: As `path`, `poses` and `fields` of `read_measurements`.
-        drive: Type of the commands: "lengths", "tensions", or "forces" of winches (default: recorded commands,
-            otherwise measured lengths of elastic cables, otherwise measured tensions).
+        drive: Type of the commands: "lengths", "tensions", or "forces" of the winches' motors (default: recorded
+            commands, otherwise measured lengths of elastic cables, otherwise measured tensions).
         delay: Known delay from a recorded command to the response of the robot [s].
         window: Duration of a window [s].
         tolerance: Largest position residual for a pass, of 95 % of the samples [m]; default: 0.05 m, or 5 % of the mean

@@ -17,6 +17,7 @@ from ..estimation.logs.recording import GAP
 from ..estimation.logs.smoothing import noise_of, smooth, widest_parabola
 from ..models import points
 from ..models.dynamics import dynamics_of
+from ..models.robot import Robot
 from ..plant import Plant, layout
 from ..plant.periods import Periods
 from ..plant.steps import steps_in
@@ -29,6 +30,7 @@ FEWEST = 5  # samples of a window
 SLOW = 0.01  # [m/s] of a cable, below which friction is less than its value at higher speeds
 NUDGE = 1e-4, 1e-3  # [m, rad] and [m/s, rad/s], by which starts are varied
 SLOPE = 8.0  # deviation of a smoothed slope, about twice that of white noise, over noise / (n^1.5 dt)
+QUICK = 400.0  # [rad/s]: that of core/plant/winch_forces.h
 FLOOR = {"position": 2e-5, "rotation": 2e-5, "tensions": 1e-2, "lengths": 1e-5}  # of noise
 
 
@@ -36,8 +38,8 @@ class Windows:
     """Windows of a recording.
 
     - `recorded`: the recording.
-    - `drive`: what is commanded: "lengths", "tensions", or "forces" of winches; default: commands where these are
-      recorded, otherwise measured lengths of cables with a stiffness, otherwise measured tensions, otherwise lengths.
+    - `drive`: what is commanded: "lengths", "tensions", or "forces" of winches' motors; default: commands where these
+      are recorded, otherwise measured lengths of cables with a stiffness, otherwise measured tensions or lengths.
     - `window`: duration of a window [s].
     - `starts`: times at which windows start [s], (W,).
     - `rows`, `inside`: samples of each window, (W, S), and which of these belong to it; the last of a shorter window is
@@ -93,12 +95,15 @@ class Windows:
         """Choose what is commanded, and by which numbers."""
         of, robot = self.recorded, self.recorded.robot
         kinds = {"lengths": of.lengths, "tensions": of.tensions}
-        self.measured_command = False
+        self.measured_command, self._lags = False, np.zeros(robot.m)
         if robot.fixed_lengths is not None:
             self.drive, self._command = "lengths", np.tile(robot.fixed_lengths, (len(of.times), 1))
-        elif of.commands is not None and drive in (None, of.commanded, "forces"):
-            forces = of.commanded == "tensions" and all(cable.winch for cable in robot.cables)
-            self.drive, self._command = "forces" if forces else of.commanded, of.commands
+        elif of.commands is not None and (drive is None or (drive == "lengths") == (of.commanded == "lengths")):
+            self.drive, self._command = drive or of.commanded, of.commands
+            if self.drive == "forces" and not all(cable.winch for cable in robot.cables):
+                self.drive = "tensions"
+            elif self.drive == "tensions":
+                self._lags = _lags(robot)
         else:
             elastic = all(cable.stiffness for cable in robot.cables)
             wanted = [drive] if drive in kinds else [*(["lengths"] if elastic else []), "tensions", "lengths"]
@@ -108,7 +113,7 @@ class Windows:
             (self.drive, self._command), self.measured_command = found[0], True
         if drive == "forces" and self.drive != drive:
             raise InputError(
-                "drive must be forces only if the log has commanded tensions and every cable of the robot has a winch"
+                "drive must be forces only if the log has commanded forces and every cable of the robot has a winch"
             )
 
     def _carrier_tracks(self) -> dict[int, PoseTrack]:
@@ -203,8 +208,8 @@ class Windows:
             carriers[:, :, index] = self._along(track)
         self._platform, self._carried = self._motion(self._along(self._track)), self._motion(carriers)
         self._attitudes = {index: self._attitude(carriers[:, :, index, 3:]) for index in self._flown}
-        values = self._command
-        self._signal: Any = lambda at: np.stack([np.interp(at, of.times, column) for column in values.T], axis=-1)
+        values, of_cables = self._command, tuple(zip(self._command.T, self._lags, strict=True))
+        self._signal: Any = lambda at: np.stack([np.interp(at - lag, of.times, one) for one, lag in of_cables], axis=-1)
         if self.drive == "lengths" and self.measured_command and len(of.times) >= FEWEST:
             from scipy.interpolate import CubicSpline
 
@@ -377,6 +382,19 @@ class Windows:
         self.widths = [part.shape[-1] for part in parts.values()]
         whole = np.concatenate([part / self.noise[name] for name, part in parts.items()], axis=-1)
         return whole.reshape(*whole.shape[:2], -1)
+
+
+def _lags(robot: Robot) -> np.ndarray:
+    """Return the lag with which drives that know their winch give tensions, (m,) [s], see core/plant/winch_forces.h.
+
+    Tensions of cables that do not stretch are given at once.
+    """
+    lags, lengths = np.zeros(robot.m), np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1)
+    for i, cable in enumerate(robot.cables):
+        if cable.winch and cable.stiffness:
+            K = cable.stiffness / lengths[i]
+            lags[i] = 2 / max(QUICK, np.sqrt(K / cable.winch.inertia)) - (cable.damping or 0.0) / K
+    return lags.clip(0.0)
 
 
 def _seen(plant: Plant, states: np.ndarray, tensions: np.ndarray) -> np.ndarray:

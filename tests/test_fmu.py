@@ -21,6 +21,7 @@ from towline.control.planned_references import references_at
 from towline.control.trajectory import read_trajectory
 from towline.core import sense
 from towline.export.fmu.export import unit_files
+from towline.models import Robot
 from towline.plant import Plant
 from towline.plant.steps import default_drive, steps_in, windings_in
 
@@ -180,6 +181,23 @@ def test_plant_and_controller_make_the_loop_of_simulate(name, step, unit):
             one.step(k * step, step)
     assert np.ptp(run.record.motions[:, 0, 0]) > 0.03
     assert np.abs(found - run.record.motions[:, 0, :6]).max() < 1e-9
+
+
+def test_motors_of_winches_are_driven_as_in_simulate(unit, tmp_path, monkeypatch):
+    """Pushed by 3 N; the unit computes its motors' forces by the same code."""
+    data = load("point-mass-3").model_dump()
+    winch = {"inertia": 3.0, "friction": 5.0, "speed_max": 50, "force_max": 1e4}
+    data["cables"] = [cable | {"stiffness": 2e5, "winch": winch} for cable in data["cables"]]
+    robot = Robot.model_validate(data)
+    monkeypatch.setenv("CFLAGS", "-O0")
+    towline.export_fmu(robot, tmp_path / "unit.fmu", "both")
+    one = unit(robot, "both", file=tmp_path / "unit.fmu")
+    one.set(["wrench.force.x"], [3.0])
+    expected = simulate(robot, robot.home, duration=0.1, disturbance=[3, 0, 0, 0, 0, 0]).record.motions[:, 0, :6]
+    for k, pose in enumerate(expected):
+        np.testing.assert_allclose(one.get(motion("platform", "pose")), pose, atol=1e-12)
+        one.step(k * STEP, STEP)
+    assert expected[-1, 0] > 1e-4
 
 
 def test_steps_may_be_longer_than_the_period_of_the_controller(unit):

@@ -5,15 +5,15 @@ Recordings are made by `simulate` and the plant at 1 kHz, sampled and given nois
 
 import json
 from functools import cache
-from unittest.mock import patch
 
 import numpy as np
 import pytest
 import xarray as xr
 
-from towline import InputError, load, simulate
+from towline import InputError, load, simulate, tensions
 from towline.control import LengthControl
 from towline.models.cable import Winch
+from towline.plant import Plant
 from towline.simulation import Replay, replay
 
 from .warm import towline as run
@@ -56,12 +56,21 @@ def motion(kind):
     robot, controller, path = {
         "lengths": (PLANAR, LengthControl(PLANAR), swing((0, 0, 0.75), (0.2, 0, 0.12), (0.5, 1, 0.8))),
         "tensions": (load("planar-4"), None, swing((0, 0, 0.75), (0.2, 0, 0.12), (0.5, 1, 0.8))),
-        "forces": (COGIRO, None, swing((0, 0, 1.5), (1.5, 1, 0.4), (0.25, 0.3, 0.4))),
+        "drives": (COGIRO, None, swing((0, 0, 1.5), (0.5, 0.4, 0.1), (0.25, 0.3, 0.4))),
     }[kind]
-    with patch(
-        "towline.simulation.command_conversion.winch_forces"
-    ):  # motors that pull as commanded, and compensate nothing
-        return robot, simulate(robot, path, controller).trajectory
+    return robot, simulate(robot, path, controller).trajectory
+
+
+@cache
+def driven_by_motors():
+    """A point mass whose motors pull with known forces, without a controller; times, forces, and the run."""
+    cables = {"stiffness": 2e4, "damping": 20.0, "winch": Winch(inertia=4, friction=2, speed_max=5, force_max=500)}
+    robot = with_cables(load("point-mass-3"), **cables)
+    plant = Plant(robot, drive="forces")
+    held = np.asarray(tensions(robot, robot.home).tensions)
+    times = 1e-3 * np.arange(2000)
+    forces = held * (1 + 0.4 * np.sin(7 * times[:, None] + [0, 2, 4]))
+    return robot, times, forces, plant.run(plant.start(tensions=held), plant.command(forces), 1e-3)
 
 
 def columns(kind, rows, seed=0):
@@ -85,7 +94,7 @@ def columns(kind, rows, seed=0):
     EA = np.array([cable.stiffness or np.inf for cable in robot.cables])
     encoders = noisy(lengths / (1 + pulls / EA), NOISE["length"]) + 0.3  # an offset of the encoders
     found |= {f"l{i} [m]": values for i, values in enumerate(encoders.T)}
-    if kind == "forces":
+    if kind == "drives":
         orders = trajectory["tensions_commanded"].values[rows]
         found |= {f"tension_cmd_{i} [N]": values for i, values in enumerate(orders.T)}
     found |= {f"tension_{i} [N]": values for i, values in enumerate(noisy(pulls, NOISE["tension"]).T)}
@@ -104,7 +113,7 @@ def written(path, found):
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("logs")
-    kinds = ("lengths", "tensions", "forces", "thrusts")
+    kinds = ("lengths", "tensions", "drives", "thrusts")
     return {kind: written(folder / f"{kind}.csv", columns(kind, every(kind))) for kind in kinds}
 
 
@@ -125,6 +134,47 @@ def test_the_right_model_leaves_the_noise(kind, logs):
     np.testing.assert_allclose(first, 1e3 * np.hypot(*result.residuals["position"][0][:, [0, 2]].T))
     assert line[0] == pytest.approx(1e3 * np.sqrt(2) * noise["position"])
     np.testing.assert_allclose(rotation.lines[0].get_ydata(), 1e3 * abs(result.residuals["rotation"][0][:, 1]))
+
+
+def test_drives_give_commanded_tensions_whatever_their_winches_weigh_and_rub(logs):
+    """Simulated drives compensate 20 kg and 15 N; replayed as the motors' forces, their commands missed by 64 mm."""
+    result = replay(COGIRO, logs["drives"])
+    assert result.to_dict()["drive"] == "tensions"
+    assert not result.named
+    # The first window begins where the recording does, with a velocity that is less well known.
+    later = {name: np.sqrt(np.nanmean(part[1:] ** 2)) for name, part in result.residuals.items()}
+    assert all(later[name] < 1.5 * noise for name, noise in result.matching.noise.items())
+    assert later["position"] < 2 * NOISE["pose"]
+
+
+def test_friction_that_drives_do_not_compensate_is_named(tmp_path):
+    rubbed = simulate(COGIRO, swing((0, 0, 1.5), (0.5, 0.4, 0.1), (0.25, 0.3, 0.4), 3.0), mismatch={"friction": 8.0})
+    result = replay(COGIRO, rubbed.save(tmp_path / "rubbed.nc"), fit=True)
+    assert result.named == ["friction"]
+    assert result.found[0].value == pytest.approx(8.0, rel=0.06)
+    assert [cable.winch for cable in result.robot.cables] == 8 * [WINCH]  # that of the file is compensated
+
+
+@pytest.mark.parametrize(("name", "options"), [("motor_force_cmd_", {}), ("tension_cmd_", {"drive": "forces"})])
+def test_forces_of_motors_move_winches_with_inertia_and_friction(name, options, tmp_path):
+    robot, times, forces, run = driven_by_motors()
+    draw, now = np.random.default_rng(0), Plant(robot, drive="forces").read(run.states[:-1])
+    rows = slice(0, len(times), 10)
+    found = {"t [s]": times[rows]}
+    found |= dict(
+        zip(("x [m]", "y [m]", "z [m]"), (now.pose[rows, :3] + draw.normal(0, 2e-4, (200, 3))).T, strict=True)
+    )
+    found |= {f"l{i} [m]": one[rows] + draw.normal(0, 5e-5, 200) for i, one in enumerate(now.lengths.T)}
+    found |= {f"{name}{i} [N]": one[rows] for i, one in enumerate(forces.T)}
+    log = written(tmp_path / "motors.csv", found)
+    result = replay(robot, log, delay=0.5e-3, **options)
+    assert result.to_dict()["drive"] == "forces"
+    assert not result.named
+    assert result.rms()["position"] < 4e-4
+    rough = with_cables(robot, winch=robot.cables[0].winch.model_copy(update={"friction": 3.0}))
+    result = replay(rough, log, delay=0.5e-3, **options)
+    assert result.named[0] in ("friction", "cable_friction")  # 1 N less, of all cables or of each
+    assert next(one.value for one in result.found if one.name == "friction") == pytest.approx(2.0, rel=0.1)
 
 
 @pytest.mark.parametrize(
@@ -163,7 +213,7 @@ CASES = [
     ("lengths", "delay", PLANAR, {"delay": 0.02}, 0.0),
     ("tensions", "mass", with_mass(load("planar-4"), 0.8), {}, 1.25),
     ("tensions", "delay", load("planar-4"), {"delay": 0.02}, 0.0),
-    ("forces", "friction", with_cables(COGIRO, winch=WINCH.model_copy(update={"friction": 18.0})), {}, 15.0),
+    ("drives", "mass", with_mass(COGIRO, 1.2), {}, 1 / 1.2),
     ("thrusts", "mass", with_mass(load("multi-quadrotor-3"), 1.2), {}, 1 / 1.2),
 ]
 

@@ -267,6 +267,10 @@ def test_three_cables_nearly_in_one_plane_are_warned_of(out):
     places[0, :, :3] = [1.5 * along + 3 * up, out * across + 3 * up, -1.5 * along + 3 * up]
     seen = Instants(Dynamics(robot), np.array([1.25]), robot.home[None], robot.carrier_home[None])
     assert weak_formation(seen) == []
+    flat = [one.model_copy(update={"home": tuple(place)}) for one, place in zip(robot.carriers, places[0], strict=True)]
+    singular = robot.model_copy(update={"carriers": tuple(flat)})
+    lost = weak_formation(Instants(Dynamics(singular), seen.times, seen.pose, places))
+    assert any("as at home, the cables cannot pull along force (" in text for text in lost) == (out == 0.0)
     found = weak_formation(replace(seen, carriers=places))
     pulls = places[0, :, :3] - [0, 0, 1]
     pulls /= np.linalg.norm(pulls, axis=1, keepdims=True)

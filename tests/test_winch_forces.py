@@ -66,11 +66,12 @@ def test_the_forces_make_the_tensions_of_a_moving_robot_as_commanded(name):
     np.testing.assert_allclose(plant.run(state, row[None], 1e-4).tensions[0], t, rtol=1e-7)
 
 
-@pytest.mark.parametrize(("EA", "inertia"), [(1e4, 3.0), (1e6, 3.0), (1e6, 0.2)])
-def test_the_tension_of_an_elastic_cable_reaches_its_command_without_oscillation(EA, inertia):
-    """The load hardly moves, so e - e* = (1 + w t) exp(-w t) (e0 - e*), with w = 400 rad/s or that of the cable."""
-    data = LIFT | {"platform": LIFT["platform"] | {"mass": 1e9}, "gravity": [0, 0, 0]}
-    own = {"stiffness": EA, "winch": WINCH | {"inertia": inertia, "friction": 0.0}}
+@pytest.mark.parametrize("mass", [1e9, 4.0, 0.1])
+@pytest.mark.parametrize(("EA", "inertia", "damping"), [(1e4, 3.0, 0), (1e6, 3.0, 0), (1e6, 0.2, 0), (1e4, 3.0, 10)])
+def test_the_tension_of_an_elastic_cable_reaches_its_command_without_oscillation(EA, inertia, damping, mass):
+    """By hand: e - e* = (1 + w t) exp(-w t) (e0 - e*), with w = 400 rad/s or that of winch and cable, for any load."""
+    data = LIFT | {"platform": LIFT["platform"] | {"mass": mass}, "gravity": [0, 0, 0]}
+    own = {"stiffness": EA, "damping": damping or None, "winch": WINCH | {"inertia": inertia, "friction": 0.0}}
     data["cables"] = [data["cables"][0] | own]
     plant, period = Plant(Robot.model_validate(data), drive="forces"), 2e-5
     state = plant.start(tensions=[100.0])
@@ -79,8 +80,23 @@ def test_the_tension_of_an_elastic_cable_reaches_its_command_without_oscillation
         row = motors(plant, state, [150.0], period)[1]
         state = plant.step(state, row, period)
         tension = plant.run(state, row[None], 1e-9).tensions[0, 0]
-        decayed = (1 + w * k * period) * np.exp(-w * k * period)
+        t = k * period  # the tension is K e + C de/dt
+        decayed = (1 + w * t - 2 * damping / EA * w**2 * t) * np.exp(-w * t)
         assert tension == pytest.approx(150 - 50 * decayed, abs=0.04 * 50)
+
+
+def test_held_forces_do_not_fight_the_damper_of_a_cable():
+    """Of 75 ms of damping, as a robot's file may have; fed back as fast as an elastic cable's it rang with 100 N."""
+    cable = LIFT["cables"][0] | {"stiffness": 3e4, "damping": 1100.0, "winch": WINCH | {"inertia": 20.0}}
+    plant = Plant(Robot.model_validate(LIFT | {"cables": [cable]}), drive="forces")
+    state, tensions = plant.start(tensions=[39.24]), []
+    for wanted in 39.24 + 5.0 * (np.arange(200) > 20):
+        row = motors(plant, state, [wanted])[1]
+        tensions.append(plant.run(state, row[None], 1e-6).tensions[0, 0])
+        state = plant.step(state, row, 1e-3)
+    np.testing.assert_allclose(tensions[:20], 39.24, atol=0.1)
+    np.testing.assert_allclose(tensions[40:], 44.24, atol=0.1)
+    assert max(tensions) < 44.24 + 0.2
 
 
 @pytest.mark.parametrize("keys", [{}, {"stiffness": 2e4}, {"stiffness": 2e5, "damping": 50}])

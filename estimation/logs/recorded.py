@@ -1,6 +1,7 @@
 """`read_recorded`: the motion and the commands of a robot over a recording, for its replay."""
 
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -33,8 +34,9 @@ class Recorded(Displayed):
     measured: np.ndarray
     lengths: np.ndarray | None  # unstrained cable lengths by the encoders of the file, (N, m) [m], or None
     tensions: np.ndarray | None  # (N, m) [N], or None
-    commands: np.ndarray | None  # commanded unstrained lengths [m] or tensions [N], (N, m), or None
-    commanded: str  # "lengths" or "tensions"
+    # commanded unstrained lengths [m], or tensions or forces of the winches' motors [N], (N, m), or None
+    commands: np.ndarray | None
+    commanded: str  # "lengths", "tensions" or "forces"
     # poses of the carriers in {G}, (N, c, 6) [m, rad]; those that never move are at home. A carrier that moves and was
     # not recorded has nan.
     carrier_pose: np.ndarray
@@ -81,6 +83,7 @@ def read_recorded(
 
         efforts = at(found.efforts, known.m) if measured.tensions is None else None
         commands, is_length = at(found.commands, known.m), bool(found.commands) and found.commands[0].unit in LENGTHS
+        motors = bool(found.commands) and re.search("motor(?!.*tension)", found.commands[0].full.lower()) is not None
         lengths = lengths_of(known, measured.lengths) if read.fields.lengths else None
         if lengths is not None and efforts is not None:  # which are lengths under tension
             lengths = lengths / lengths_of(known, np.ones_like(efforts), efforts) * lengths_of(known, np.ones(known.m))
@@ -113,7 +116,7 @@ def read_recorded(
             lengths=lengths,
             tensions=tensions,
             commands=commands,
-            commanded="lengths" if is_length else "tensions",
+            commanded="lengths" if is_length else "forces" if motors else "tensions",
             carrier_pose=carrier_pose,
             thrusts=thrusts,
             notes=notes,

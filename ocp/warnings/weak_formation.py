@@ -15,8 +15,8 @@ NONE = 1e-3  # of the largest one at home; a smaller one does not count
 def weak_formation(seen: Instants, formation: float | None = None) -> list[str]:
     """Return a sentence if the wrench matrix comes close to losing rank, in comparison with home.
 
-    Moments are divided by the robot's length, and singular values that are near zero at home do not count. `formation`
-    is that of the objective [m]; default: the mean length of the cables.
+    Moments are divided by the robot's length. Singular values that are near zero at home do not count, unless they are
+    so in the motion, too. `formation` is that of the objective [m]; default: the mean length of the cables.
     """
     robot = seen.robot
     rows = np.flatnonzero(robot.dof_mask)
@@ -24,14 +24,19 @@ def weak_formation(seen: Instants, formation: float | None = None) -> list[str]:
     at_home = np.linalg.svd(scale * seen.dynamics.wrench_matrix(robot.home)[rows], compute_uv=False)
     rank = int((at_home > NONE * at_home[0]).sum())
     U, values, _ = np.linalg.svd(scale * seen.dynamics.wrench_matrix(seen.pose, seen.carriers)[:, rows])
-    k = int(values[:, rank - 1].argmin())
-    share = values[k, rank - 1] / at_home[rank - 1]
+    lost = rank < len(rows) <= robot.m and values[:, -1].min() <= NONE * at_home[0]
+    last = values.shape[1] - 1 if lost else rank - 1
+    k, direction = int(values[:, last].argmin()), np.zeros(6)
+    direction[rows], share = U[k, :, last], values[k, last] / at_home[last]
+    if lost:
+        return [
+            f"at t = {seen.times[k]:.3f} s, as at home, the cables cannot pull along {direction_text(direction)}, "
+            "because the wrench matrix is singular; other homes of the carriers could change that"
+        ]
     if share > WEAK:
         return []
     of_home = quantity(100 * share, "%", 2) if share >= LEAST else f"less than {100 * LEAST:g} %"
     smaller = quantity(SMALLER * (formation or float(seen.dynamics.cable_lengths(robot.home).mean())), "m", 2)
-    direction = np.zeros(6)
-    direction[rows] = U[k, :, rank - 1]
     return [
         f"from where the carriers are at t = {seen.times[k]:.3f} s, the cables pull along {direction_text(direction)} "
         f"with {of_home} of their effect at home; a smaller objective.formation, such as "
