@@ -212,8 +212,8 @@ class LengthControl(Controller):
         return np.clip(np.nan_to_num(wanted), -self._most, self._most), status
 
     def _gains_for(self, dt: float, age: float) -> tuple[float, float]:
-        """Return P and I [1/s], given or by default, for a pose of an age [s] and lengths held for `dt` [s]."""
-        usual = self._gains.at(age + dt)
+        """Return P and I [1/s], given or by default, for a pose of an age [s] and steps of `dt` [s]."""
+        usual = self._gains.at(dt, age)
         return (
             usual[0] if self._proportional is None else self._proportional,
             usual[1] if self._integral is None else self._integral,

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from scipy.linalg import expm
 
 from ..models.dynamics import dynamics_of
 from ..models.elasticity import whitening
@@ -15,7 +16,7 @@ UNYIELDING, LATE = (0.3, 2.0), 0.02  # P and I for cables that do not stretch, u
 LEAST = 1e-3  # of the usual gains; smaller ones are replaced by 0
 SLOW = 0.01  # [1/s]: accepted growth, which rounding or motions that no cable damps may cause
 MARGIN = 1.25  # factor by which gains stay below those at which oscillations no longer decay
-TRUE = 0.8, 1.0, 1.25  # stiffness and damping of the cables, in terms of the assumed ones
+TRUE = 0.5, 0.8, 1.0, 1.25  # stiffness and damping of the cables, in terms of the assumed ones, also with slack ones
 PARTS = 4  # of a delay in the model, each an all-pass of first order; their phase is exact to 0.1 rad up to 3 rad
 FINER = 1.25  # ratio of the delays for which gains are computed
 SHORTEST = 1e-4  # [s]
@@ -24,17 +25,18 @@ RIPPLE = 0.01  # standard deviation of tensions by noise of the pose, in terms o
 
 
 class LengthGains:
-    """Gains P and I of lengths that are corrected by J (P e + I * integral of e), with a pose that is h late.
+    """Gains P and I of lengths that are corrected by J (P e + I * integral of e), with a pose of an age h.
 
-    Elastic cables pull with E A times their strain, and C times its rate. Deviations x from home, their integral z, and
-    the correction u obey
+    Elastic cables pull with E A times their strain, and C times its rate. Deviations x from home, their sum z over the
+    periods T, and the correction u obey
 
-        x'' = -G x - E (x + u) - D (x' + u'),   u(t) = (P x + I z)(t - h),   z' = x
+        x'' = -G x - E (x + u) - D (x' + u'),   u(t + T) = P y + I z,   z(t + T) = z + T y,   y = x(t - h)
 
-    per unit of mass, where G is the stiffness due to constant tensions, E that due to elasticity, and D the damping. P
-    is at most 4 and I at most 10/s; each is halved until no oscillation grows, with a margin of 25 % and with cables
-    that are 20 % softer or 25 % stiffer. A late pose, little damping or a platform that turns slowly, since its
-    attachments are close to each other, need small gains; cables without damping permit none.
+    per unit of mass, with a constant u' in each period, where G is the stiffness due to constant tensions, E that due
+    to elasticity, and D the damping. P is at most 4 and I at most 10/s; each is halved until no oscillation grows, with
+    a margin of 25 % and with cables that are 25 % stiffer, or half as stiff, as while some are slack. A late pose, a
+    long period, little damping or a platform that turns slowly, since its attachments are close to each other, need
+    small gains; cables without damping permit none.
 
     Args:
         robot: The robot.
@@ -45,7 +47,7 @@ class LengthGains:
 
     def __init__(self, robot: Robot, stiffness: np.ndarray, damping: np.ndarray, lag: float, sensors: Noise | None):
         self._elastic = bool(np.isfinite(stiffness).all())
-        self._known: dict[int, tuple[float, float]] = {}
+        self._known: dict[tuple[int, int], tuple[float, float]] = {}
         self._most = USUAL[0]
         if not self._elastic:
             return
@@ -61,38 +63,44 @@ class LengthGains:
             noise = stretch * np.hypot(springs, damping * np.sqrt(2) / STEP)  # [N]
             self._most = min(self._most, float((RIPPLE * (robot.t_max - robot.t_min) / np.maximum(noise, 1e-9)).min()))
 
-    def at(self, late: float) -> tuple[float, float]:
-        """Return P and I [1/s] for a pose that is `late` [s] when its correction takes effect."""
+    def at(self, period: float, age: float) -> tuple[float, float]:
+        """Return P and I [1/s] for steps of a period and a pose of an age [s]."""
         if not self._elastic:
-            share = min(1.0, LATE / late)
+            share = min(1.0, LATE / (period + age))
             return UNYIELDING[0] * share, UNYIELDING[1] * share
-        step = max(0, int(np.ceil(np.log(late / SHORTEST) / np.log(FINER))))
-        if step not in self._known:
-            late = SHORTEST * FINER**step
-            P = _largest(self._most, USUAL[0], lambda gain: self._grows(late, gain, 0.0))
-            self._known[step] = P, _largest(USUAL[1], USUAL[1], lambda gain: self._grows(late, P, gain))
-        return self._known[step]
+        steps = [max(0, int(np.ceil(np.log(max(one, SHORTEST) / SHORTEST) / np.log(FINER)))) for one in (period, age)]
+        key = steps[0], steps[1] if age > 0 else -1
+        if key not in self._known:
+            period, age = (SHORTEST * FINER**step * (step >= 0) for step in key)
+            P = _largest(self._most, USUAL[0], lambda gain: self._grows(period, age, gain, 0.0))
+            self._known[key] = P, _largest(USUAL[1], USUAL[1], lambda gain: self._grows(period, age, P, gain))
+        return self._known[key]
 
-    def _grows(self, late: float, proportional: float, integral: float) -> bool:
+    def _grows(self, period: float, age: float, proportional: float, integral: float) -> bool:
         """Return whether an oscillation grows with larger gains, and with softer or stiffer cables."""
-        return any(
-            np.linalg.eigvals(self._loop(late, MARGIN * proportional, MARGIN * integral, true)).real.max() > SLOW
-            for true in TRUE
-        )
+        gains = MARGIN * proportional, MARGIN * integral
+        return any(self._growth(period, age, *gains, true) > SLOW for true in TRUE)
 
-    def _loop(self, late: float, proportional: float, integral: float, true: float) -> np.ndarray:
-        """Return the matrix of the linear dynamics of x, x', z and the states q of the delay: q' = a (u - q).
+    def _growth(self, period: float, age: float, proportional: float, integral: float, true: float) -> float:
+        """Return how fast the fastest oscillation grows [1/s], from the exact linear map of a period.
 
-        Each part of the delay turns its input u into 2 q - u.
+        Its states are x, x', u, the states q of the delay, and z. Each part of the delay turns its input y into
+        2 q - y, with q' = a (y - q).
         """
-        n, rate = len(self._G), 2 * PARTS / late
-        x, v, z, *q = np.eye((3 + PARTS) * n).reshape(3 + PARTS, n, -1)
-        u, slope, delayed = proportional * x + integral * z, proportional * v + integral * x, []
+        n, parts = len(self._G), PARTS * (age > 0)
+        x, v, u, *q, last = np.eye((4 + parts) * n).reshape(
+            4 + parts, n, -1
+        )  # the last: u' in a period, or z before it
+        y, changes = x, []
         for state in q:
-            delayed.append(rate * (u - state))
-            u, slope = 2 * state - u, 2 * delayed[-1] - slope
-        falls = -self._G @ x - true * (self._E @ (x + u) + self._D @ (v + slope))
-        return np.vstack([v, falls, x, *delayed])
+            changes.append(2 * PARTS / age * (y - state))
+            y = 2 * state - y
+        falls = -self._G @ x - true * (self._E @ (x + u) + self._D @ (v + last))
+        moved = expm(period * np.vstack([v, falls, last, *changes, 0 * last]))
+        total = last + period * y
+        slope = (proportional * y + integral * total - u) / period
+        step = np.vstack([(moved @ np.vstack([x, v, u, *q, slope]))[:-n], total])
+        return float(np.log(np.abs(np.linalg.eigvals(step)).max()) / period)
 
 
 def _largest(first: float, usual: float, grows: Any) -> float:

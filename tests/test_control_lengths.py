@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from towline import InputError, load, plan, simulate
 from towline.control import ANSWERS, ComputedTorque, LengthControl, Reference, State, references
 from towline.control.command import HOLD, PLANNED
+from towline.control.length_gains import LengthGains
 from towline.models import Dynamics, Robot
 from towline.models.points import angles
 
@@ -354,3 +355,17 @@ def test_a_circle_on_stiff_cables_begins_and_goes_on_with_its_tensions(damping):
         run = simulate(robot, circle, LengthControl(robot), duration=1.0)
     assert run.passed, run.failures
     assert run.error.max() < 1e-4
+
+
+@pytest.mark.parametrize(("period", "gains"), [(0.02, (0.5, 0.0)), (0.02, (0.2, 5.0)), (0.05, (0.3, 0.0))])
+def test_the_growth_of_oscillations_is_that_of_a_simulation(period, gains):
+    """Of 5 kg on three cables, pushed so little that none becomes slack, over 140 periods."""
+    robot = elastic("point-mass-3", 5e3)  # with a damping of 10 N s/m
+    control = LengthControl(robot, proportional=gains[0], integral=gains[1])
+    push = [f"push 0.02 0.01 0.03 at {period} for {period}"]
+    run = simulate(robot, robot.home, control, period=period, duration=160 * period, events=push)
+    error = np.linalg.norm(run.record.motions[:160, 0, :3] - robot.home[:3], axis=1)
+    means = np.sqrt(np.mean(np.square(error.reshape(-1, 20)), axis=1))
+    expected = LengthGains(robot, control.stiffness, np.full(3, 10.0), 0.0, None)._growth(period, 0.0, *gains, 1.0)
+    assert expected > 0.3
+    assert np.log(means[-1] / means[0]) / (140 * period) == pytest.approx(expected, rel=0.1)
