@@ -573,3 +573,13 @@ def test_a_law_is_not_cut_off_by_a_shorter_duration():
     with pytest.raises(InputError, match=r"duration must be at least .* where the times of path end, got 0\.1 s"):
         plan("cogiro", task.model_copy(update={"duration": 0.1}))
     assert plan("cogiro", task.model_copy(update={"duration": 9.0})).feasible
+
+
+@pytest.mark.parametrize("speed", [0.02, 0.1, 0.5])
+def test_a_slow_speed_limit_is_reached_as_soon_as_a_large_acceleration_permits(speed):
+    """Between limits of speed and acceleration the fastest law is a trapezoid of known duration."""
+    start, end = [-1, -0.5, 1.5], [1, 0.5, 2.0]
+    limits = {"platform_speed": speed, "platform_acceleration": 0.5}
+    found = time_along("cogiro", {"path": {"kind": "line", "start": start, "end": end}, "limits": limits})
+    assert found.feasible
+    assert found.duration == pytest.approx(np.sqrt(5.25) / speed + speed / 0.5, rel=5e-4)

@@ -53,6 +53,7 @@ LARGEST_RESERVE = 0.01  # of the weight
 LARGEST_SHRINK = 0.01
 COARSE = 4e-3  # of the weight: if more is missing it takes a finer grid, if less a reserve there
 RISE = 2.5  # times 1 / intervals: change of the logarithm of a zone's bound from point to point
+NEAR_REST = 0.5 ** np.arange(7.0, 0.0, -1.0)  # of the interval beside a rest, where further points are
 CLOSEST = 1e-3  # of a step of a grid: points that are nearer to each other are one
 COARSE_EXCESS = 1e-4  # of a limit: if it is exceeded by more it takes a finer grid, if by less some distance everywhere
 PIECES = (400, 800, 1600)  # of a spline through points of a path, until it is near enough
@@ -124,7 +125,7 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
     while True:
         attempts += 1
         rises = np.concatenate([[], *(parametrised.rises(zone, RISE / intervals) for zone in zones)])
-        grids = [_through(s, corners, rises) for s in parametrised.pieces(intervals)]
+        grids = [_through(s, corners, np.append(rises, _rests(s))) for s in parametrised.pieces(intervals)]
         pieces = [_piece(parametrised, limits, s, margin, _reserve(s, short, weight), shrink, weaker) for s in grids]
         s = np.concatenate([pieces[0].s[:1], *(piece.s[1:] for piece in pieces)])
         law = FastestLaw(parametrised, limits, margin, s, np.full(len(s), np.nan))
@@ -152,8 +153,8 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
             law = replace(law, at=float(law.path.law(audited.times[[audited.worst]])[0][0]))
             reason = f"no time law passed the audit in {ATTEMPTS} attempts"
             return Plan(scenario, MotionStatus.NOT_FOUND, None, audited, 0.0, 0.0, reason, law=law)
-        if not weaker.any() and any(each.limit == WinchForce.name for each in audited.excess):
-            limits, weaker = _for_winches(scenario.limits, audited, limits)
+        if any(each.limit == WinchForce.name for each in audited.excess):
+            limits, weaker = _for_winches(scenario.limits, audited, limits, weaker)
             continue
         missing = _missing(law, audited)
         known = (each for each in audited.excess if each.limit in KNOWN_LIMITS)
@@ -164,6 +165,14 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
         else:
             short.append(missing)
             shrink = min(shrink + 2 * excess, LARGEST_SHRINK)
+
+
+def _rests(s: np.ndarray) -> np.ndarray:
+    """Return points beside both ends of a grid, where its motion rests: there the speed can rise at once.
+
+    Its square is linear from a rest to the first point, which takes twice as long as at the speed there.
+    """
+    return np.append(s[0] + NEAR_REST * (s[1] - s[0]), s[-1] - NEAR_REST * (s[-1] - s[-2]))
 
 
 def _through(s: np.ndarray, corners: np.ndarray, rises: np.ndarray) -> np.ndarray:
@@ -202,13 +211,13 @@ def _shown(task: Task, law: FastestLaw) -> Plan:
     return Plan(scenario, MotionStatus.INFEASIBLE, None, audited, 0.0, 0.0, law=law)
 
 
-def _for_winches(limits: Limits, audited: Audit, kept: PathLimits) -> tuple[PathLimits, np.ndarray]:
+def _for_winches(limits: Limits, audited: Audit, kept: PathLimits, weaker: np.ndarray) -> tuple[PathLimits, np.ndarray]:
     """Return limits with which motors can pull and accelerate their winches, and how much smaller t_max is, (m,) [N].
 
-    The force of each motor is divided between the tension and the inertia of its winch, in the proportion in which a
-    motion that exceeded it needs both.
+    `kept` and `weaker` are those so far. The force of each motor is divided between the tension and the inertia of its
+    winch, in the proportion in which a motion that exceeded it needs both.
     """
-    robot, weaker, more = limits.robot, np.zeros(limits.robot.m), list[Limit]()
+    robot, weaker, more = limits.robot, weaker.copy(), list[Limit]()
     for limit, forces in zip(limits, audited.limited, strict=True):
         for cable, force in zip(limit.cables, forces.T, strict=True) if isinstance(limit, WinchForce) else ():
             winch, tension = robot.cables[cable].winch, audited.tensions[:, cable]
@@ -216,7 +225,7 @@ def _for_winches(limits: Limits, audited: Audit, kept: PathLimits) -> tuple[Path
             if winch and needed + tension.max() > limit.high:
                 share = needed / (needed + tension.max()) * limit.high
                 more.append(CableAcceleration(robot, share / winch.inertia, [cable]))
-                weaker[cable] = max(robot.t_max[cable] - (limit.high - share), 0.0)
+                weaker[cable] = max(robot.t_max[cable] - (limit.high - share), weaker[cable])
     return kept._replace(accelerations=Limits(robot, (*kept.accelerations.all, *more))), weaker
 
 
