@@ -9,6 +9,9 @@ from towline.ocp.reports.report import sections
 from towline.ocp.search.largest_share import largest_share
 from towline.ocp.search.other_paths import other_yaws, shifted
 from towline.ocp.search.search import Search
+from towline.ocp.search.stronger_or_nearer import _balanced_share
+from towline.ocp.tasks.lay_out import lay_out
+from towline.ocp.tasks.task import read_task
 
 WAYS = {
     "beyond the frame": ("cogiro", [0, 0, 2], [9, 0, 2], {}),
@@ -553,3 +556,16 @@ def test_a_variation_that_the_task_refuses_is_not_offered():
     for tube, names in (({}, ["yaw at path.points[1]"]), ({"position": 0.3, "waypoints": "exact"}, [])):
         scenario = Planner("cogiro", task | {"tube": tube}).scenario
         assert [each.name for each in largest_share(Search(scenario, {}, None), other_yaws(scenario))] == names
+
+
+def test_the_share_of_t_min_at_which_a_team_rests_is_that_of_its_only_tensions():
+    """Three cables from one ring to another hold the platform in one way: each with W / (3 cos) of its angle."""
+    data = load("multi-quadrotor-3").model_dump()
+    for cable in data["cables"]:
+        cable["t_min"] = 20.0
+    robot = Robot.model_validate(data)
+    task = {"path": {"kind": "line", "start": [0, 0, 0], "end": [0.1, 0, 0]}, "duration": 3}
+    share = _balanced_share(lay_out(robot, read_task(task | {"base": {"kind": "free", "ends": "rest"}})))
+    own = tensions(load("multi-quadrotor-3"), robot.home).tensions.min()
+    missed = 0.1 * robot.weight  # is what rest may miss of the force of few cables, which a program finds
+    assert 20 * share == pytest.approx(own, abs=missed / 3 + 20 / 50)

@@ -215,13 +215,14 @@ def _longer_duration(search: Search, audit: Audit, shortest: float, longest: flo
         return []
     ease = at_ease(scenario)
     slowest = max(ease, 2 * shortest, *(slower(excess) * requested for excess in audit.excess))
-    plan = _lasting(search, min(slowest, max(ease, longest), scenario.longest), None)
+    plan = _lasting(search, min(slowest, max(ease, longest), scenario.longest))
     if plan is None:
         return []
     objective = task.objective.model_copy(update={"time": TIME_COUNTS * plan.duration})
     open_ended = with_task(scenario, duration=PositiveRange(min=shortest, max=plan.duration), objective=objective)
     outcome = solved(search, open_ended, plan.deviation)
-    near = None if outcome is None else _lasting(search, LONGER_CHOSEN * max(outcome.duration, requested), outcome)
+    # Without a guess, as when it is planned anew.
+    near = None if outcome is None else _lasting(search, LONGER_CHOSEN * max(outcome.duration, requested))
     found = near or plan
     return [Relaxed("duration", "s", requested, found.duration, found, "" if near else SHORTER)]
 
@@ -234,12 +235,10 @@ def at_ease(scenario: Scenario) -> float:
     return float(scenario.duration * np.sqrt(fastest / (EASE * of_weight)))
 
 
-def _lasting(search: Search, seconds: float, near: Outcome | None) -> Plan | None:
-    """Return the plan of the search's task with another duration, from a motion that is `near`."""
-    scenario, seconds = search.scenario, rounded(seconds, up=True)
-    longer = with_task(scenario, duration=seconds)
-    guess = None if near is None else near.deviation.stretched(seconds / near.deviation.nodes[-1])
-    return planned(search, longer, "audit, longer duration", guess)
+def _lasting(search: Search, seconds: float) -> Plan | None:
+    """Return the plan of the search's task with another duration."""
+    longer = with_task(search.scenario, duration=rounded(seconds, up=True))
+    return planned(search, longer, "audit, longer duration")
 
 
 def planned(search: Search, scenario: Scenario, name: str, guess: Deviation | None = None) -> Plan | None:

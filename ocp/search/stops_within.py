@@ -25,7 +25,8 @@ from ..tasks.lay_out import with_task
 from ..tasks.paths import TimedPath
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
-from .relaxations import rounded
+from .relaxations import planned, rounded
+from .search import Search
 
 LEAST_PERIOD, INSTANTS = 0.02, 200  # [s], from the beginning of one stop to that of the next; and how many at most
 ONE_OF = 8  # stops is computed first, where it is enough to know that one takes too long
@@ -157,19 +158,19 @@ def _to_stop(plan: Plan, seconds: float) -> Offers:
 
 
 def _longer(plan: Plan, seconds: float) -> list[Relaxed]:
-    """Return a longer duration with which a motion without free coordinates stops in so many seconds."""
+    """Return a longer duration with which a motion stops in so many seconds."""
     short, scenario = plan, plan.scenario
-    if scenario.count or not scenario.stretches or scenario.duration_range is not None:
+    if not scenario.stretches or scenario.duration_range is not None:
         return []
+    search = Search(scenario, {}, None)
     for _ in range(ROUNDS):
         lasts = rounded(_between(short, None, seconds), up=True)
         if lasts > scenario.longest or short.stop is None:
             break
-        longer = with_task(scenario, duration=lasts)
-        audited = audit(longer, None)
-        if not audited.passed:
+        longer = planned(search, with_task(scenario, duration=lasts), "audit, slower, to stop in time")
+        if longer is None:
             break
-        short = _judged(Plan(longer, MotionStatus.FEASIBLE, None, audited, 0.0, 0.0), longer, seconds)
+        short = _judged(longer, longer.scenario, seconds)
         if short.feasible:
             return [Relaxed("duration", "s", plan.duration, lasts, short)]
     return []

@@ -1,5 +1,6 @@
 """What else would make a motion feasible: another path (`other_paths`), less wind or mass, other cables, a tube."""
 
+from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -12,6 +13,8 @@ from ...models import Robot
 from ...models.part import Vector3
 from ..audits.audit import Audit
 from ..audits.excess import TENSIONS
+from ..global_path.at_rest import AtRest
+from ..global_path.space import Space
 from ..plan import Plan
 from ..proofs.durations import durations
 from ..result import Relaxed
@@ -29,6 +32,7 @@ from .relaxations import BEYOND, LONGER, longer_durations, near_motion, other_du
 from .search import Search
 from .slower import longer, longer_phases, slower_rate, slower_states
 
+SHARES = 51  # of t_min that are distinguished at rest
 STRONGEST = 100.0  # times t_max: a motion that needs more is not one that stronger cables make feasible
 MOST = 0.5  # [rad], of a tilt that is offered
 SPARE = 1.01  # times the largest tilt at the nodes
@@ -122,9 +126,24 @@ def _by_a_program(search: Search, scenario: Scenario, audit: Audit) -> list[Rela
     """Return the first change with which a program finds a motion, or else all together, since each solves programs."""
     every = partial(largest_share, search)
     found = past_regions(search, scenario) if _in_the_way(audit) else []
+    found = found or every(_smaller_t_min(scenario), most=_balanced_share(scenario))
     found = found or next(filter(None, (every(make(scenario)) for make in BY_PROGRAMS)), [])
     found = found or every(near_home(scenario), rates=True)
     return found or together(search, scenario, (*BY_PROGRAMS, longer))
+
+
+def _balanced_share(scenario: Scenario) -> float:
+    """Return the largest share of t_min with which the formation at both ends rests; 0 if no smaller t_min helps."""
+    change = _smaller_t_min(scenario)
+
+    def rests(varied: Scenario) -> bool:
+        space = Space(varied)
+        return bool((AtRest(varied, space.size)(*space.poses(space.ends)).worst >= 0).all())
+
+    if change is None or rests(scenario) or not rests(change.at(0.0)[0]):
+        return 0.0
+    shares = np.linspace(0.0, 1.0, SHARES)
+    return float(shares[bisect_left(range(SHARES), True, key=lambda k: not rests(change.at(shares[k])[0])) - 1])
 
 
 def _changes(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
