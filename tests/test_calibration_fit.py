@@ -9,11 +9,11 @@ from scipy.optimize import least_squares
 
 from towline.estimation.calibration import Measurements, calibrate, cross_validation, starts
 from towline.estimation.calibration import model as model_module
+from towline.estimation.calibration.autocorrelation import information_of
 from towline.estimation.calibration.curvature import curvature
 from towline.estimation.calibration.fit import fit
 from towline.estimation.calibration.geometry import length_of
 from towline.estimation.calibration.normal_equations import NormalEquations, metric
-from towline.estimation.calibration.outliers import autocorrelation
 from towline.estimation.calibration.parameters import OF_CABLE
 from towline.estimation.calibration.solving import model_of
 from towline.models import Dynamics, load
@@ -191,7 +191,7 @@ def test_parts_with_and_without_poses_count_as_in_the_whole_log(monkeypatch, gro
         np.testing.assert_allclose(one, other, rtol=1e-5, atol=1e-7)
 
 
-def test_scores_of_blocks_are_the_same_in_parts(monkeypatch):
+def test_autocorrelation_is_the_same_in_parts(monkeypatch):
     """Tensions that grow threefold along a log: the scale of friction is that of the whole log, not of a part."""
     robot, draw, times = load("cogiro"), np.random.default_rng(5), 0.05 * np.arange(250)
     poses = robot.home + [1, 0.8, 0.4, 0.1, 0.1, 0.2] * np.sin(np.outer(times, [1.1, 0.7, 0.9, 0.6, 0.8, 0.5]))
@@ -200,9 +200,12 @@ def test_scores_of_blocks_are_the_same_in_parts(monkeypatch):
     log = Measurements(Dynamics(robot).cable_lengths(poses), poses, times=times, tensions=tensions, sigma=sigma)
     model = model_of(robot, log, ("anchors", "clock", "mass", "com", "friction"), {})
     p = int(model.parameters.varies.sum())
-    whole = autocorrelation(model, model.begin(), np.eye(p), p, 1.0)
+    whole, factor = information_of(model, model.begin(), np.eye(p), np.eye(p))
     monkeypatch.setattr(model_module, "PART", 60)
-    assert autocorrelation(model, model.begin(), np.eye(p), p, 1.0) == pytest.approx(whole, rel=1e-9)
+    parts, again = information_of(model, model.begin(), np.eye(p), np.eye(p))
+    assert factor > 2
+    assert again == pytest.approx(factor, rel=1e-9)
+    np.testing.assert_allclose(parts, whole, rtol=1e-6, atol=1e-9 * np.abs(whole).max())
 
 
 @pytest.mark.parametrize("clock", [(), ("clock",)])

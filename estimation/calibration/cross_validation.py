@@ -24,7 +24,6 @@ from .solving import (
     check_enough,
     cleaned,
     covariance_of,
-    inflation_of,
     is_enough,
     lengths_of,
     model_of,
@@ -180,7 +179,7 @@ def _clock_sigma(solved: Solved) -> float:
     """Return the standard deviation of the clock offset [s]."""
     of = solved.model.parameters
     at = int(np.flatnonzero(np.flatnonzero(of.varies) == of.clock)[0])
-    variance = inflation_of(noise_of(solved)) * covariance_of(solved)[at, at]
+    variance = covariance_of(solved, noise_of(solved))[at, at]
     return float(np.sqrt(variance)) if solved.observability.determined[at] else np.inf
 
 

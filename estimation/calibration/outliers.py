@@ -6,9 +6,7 @@ distributed, and the largest of a sample marks the outlier (Baarda). A slip chan
 sample on. Cumulative sums test this additional parameter for every cable and sample at once.
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -20,10 +18,9 @@ from .fit import fit, held
 from .geometry import length_of
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
-from .parameters import OF_CABLE, Parameters
+from .parameters import Parameters
 from .products import quadratic_forms
-from .projection import Part, Projected, equations_of, parts, project
-from .sightings import SEEN
+from .projection import Projected, parts, project
 
 LEVEL = 0.005  # of both tests, for all readings together, and share of sound ones among several outliers
 LEAST_THRESHOLD = 5.0  # sigmas; errors have longer tails than the normal distribution
@@ -35,14 +32,9 @@ NEARLY = 0.3  # of the clearest slip's statistic, of another cable's that may be
 MOST_CANDIDATES = 3
 WINDOW = 25  # samples on each side, over which a slip must be visible as a step
 VISIBLE = 0.5  # share of it that must be
-BLOCKS = 25  # of the record, of at least so many samples each, to see whether residuals are autocorrelated
-SHORTEST_BLOCK = 8
 UNBALANCED = 1 - 1e-7  # share of sound samples whose forces are in better balance than those that are left out
-BY_CHANCE = 2.0  # standard deviations by which the ratio of variances may exceed 1 where residuals are independent
 NEAR_LIMIT = 0.25  # of the largest residual: range below it in which the density of residuals is counted
-UNEQUAL = 1.5  # times the variance of the squares of normally distributed errors
 MOST_LOST = 0.5  # largest reduction of E psi'
-MOST_LEVERAGE = 0.9  # of a block; with more, its residuals would be far too uncertain
 FORCES_BY_CHANCE = 0.1  # by which the noise of forces may differ from the stated one
 
 
@@ -92,83 +84,17 @@ def _limit(sizes: np.ndarray, count: int, known: int) -> float:
     return float(limits[beyond[-1]]) if beyond.size else first
 
 
-def autocorrelation(model: Model, state: State, inverse: np.ndarray, rank: int, excess: float) -> float:
-    """Return the factor by which errors that are autocorrelated or unequal increase the variances of the parameters.
-
-    With g_b = J_b'e_b over block b of the record, parameters have the covariance S^-1 (sum g_b g_b') S^-1 for any
-    errors inside blocks, and excess^2 S^-1 for independent equal ones. The result, at least 1, is the ratio of the two
-    as a mean over all directions, because single directions would need many more blocks. Parameters adapt to the errors
-    of a block by the leverage A = S^-1/2 S_b S^-1/2 with S_b = J_b'J_b, so residuals are divided by 1 - A, which gives
-    those without the block. For equal errors the sum is then too large by a known amount, which is subtracted.
-    """
-    count = len(model.measurements)
-    blocks = BLOCKS if count >= BLOCKS * SHORTEST_BLOCK else count
-    if not rank:
-        return 1.0
-    block = np.arange(count) * blocks // count  # of each sample
-    S, g = np.zeros((blocks, *inverse.shape)), np.zeros((blocks, len(inverse)))
-    for part in parts(model, state, equations_of(model, state)):
-        of_samples, first = block[part.rows], int(block[part.rows][0])
-        edges = np.searchsorted(of_samples, np.arange(first, of_samples[-1] + 2))
-        for J, e, columns in _equations(part):
-            for b, (begin, end) in enumerate(pairwise(edges), first):
-                rows = J[begin:end].reshape(-1, len(columns))
-                S[b][np.ix_(columns, columns)] += rows.T @ rows
-                g[b, columns] += rows.T @ e[begin:end].ravel()
-    values, vectors = np.linalg.eigh(inverse)
-    root = vectors[:, -rank:] * np.sqrt(np.maximum(values[-rank:], 0.0))
-    leverage, axes = np.linalg.eigh(root.T @ S @ root)  # (blocks, rank)
-    leverage = np.clip(leverage, 0.0, 1.0)
-    sizes = ((g @ root)[:, None] @ axes)[:, 0] ** 2 / excess**2
-    factors = 1 / (1 - np.minimum(leverage, MOST_LEVERAGE))
-    usual = factors**2 * leverage * (1 - leverage)
-    equal = (factors * sizes).sum() / max(leverage.sum(), 1e-300)  # variance, if it is the same in all blocks
-    more = float((factors**2 * sizes - equal * (usual - leverage) - leverage).sum()) / rank
-    chance = 2 * float((usual**2).sum())  # variance of the sum, of normally distributed errors
-    unequal = float(((factors**2 * sizes - usual) ** 2).sum()) > UNEQUAL * chance
-    if model.weights.all() and not unequal:
-        return 1 + more if more > BY_CHANCE * np.sqrt(chance) / rank else 1.0
-    return (1 + max(more, 0.0)) * (1.0 if model.weights.all() else _by_left_out(model, state))
-
-
-def _by_left_out(model: Model, state: State) -> float:
+def by_left_out(model: Model, state: State) -> float:
     """Return the factor by which leaving out readings that disagree increases the variances of parameters.
 
     An M-estimator has the variance E psi^2 / (E psi')^2 with psi(e) = e up to a limit c and 0 beyond, for which E psi'
     is smaller by c times the density of errors at +-c. A sample that is left out in part loses one redundant equation.
     """
+    if model.weights.all():
+        return 1.0
     size, redundancy, _ = _sizes(model, state)
     near = np.sum(size.max(axis=0) > (1 - NEAR_LIMIT) * size.max()) if size.any() else 0
     return float((1 - min(near / NEAR_LIMIT / max(float(redundancy[size > 0].sum()), 1.0), MOST_LOST)) ** -2)
-
-
-def _equations(part: Part) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield derivatives (n, k, p) without the part of the poses [1/m], residuals (n, k), and columns (p,) of each kind.
-
-    Kinds are the readings of each cable, the balance of forces, and the directions of each cable.
-    """
-    model, scale, inverse_root, Y = part.model, part.scale, part.inverse_root, part.Y
-    varies, forces, seen = model.parameters.varies, part.derivatives.balance, part.derivatives.directions
-    for i, e in enumerate(part.residuals):
-        J, columns = part.without_poses(i)
-        yield J[:, None], e[:, None], columns
-    every = np.arange(int(varies.sum()))
-    if forces is not None and forces.by_parameters is not None and forces.by_pose is not None:
-        H = forces.by_parameters[..., varies] / scale[varies]
-        if inverse_root is not None and Y is not None:
-            H = H - forces.by_pose * model.poses_vary[:, None] @ np.swapaxes(inverse_root, 1, 2) @ Y
-        yield H, forces.residuals, every
-    if seen is None or seen.cables is None or seen.clock is None or seen.poses is None:
-        return
-    clock = model.parameters.clock
-    for i, e in enumerate(seen.residuals):
-        J = np.zeros((*e.shape, model.parameters.count))
-        J[..., i * OF_CABLE + np.array(SEEN)], J[..., clock] = seen.cables[i], seen.clock[i]
-        J = J[..., varies] / scale[varies]  # (n, 3, p)
-        if inverse_root is not None and Y is not None:
-            root = (seen.poses[i] * model.poses_vary[:, None, :6]) @ np.swapaxes(inverse_root[:, :, :6], 1, 2)
-            J = J - root @ Y
-        yield J, e, every
 
 
 def find_unbalanced(model: Model, state: State) -> tuple[float, np.ndarray] | None:

@@ -31,7 +31,7 @@ from .geometry import length_of
 from .interpretations import FACTORS, Interpretation, interpretations
 from .parameters import Parameters
 
-CLEARLY, VERY_CLEARLY = 1.25, 2.0  # times smaller differences
+CLEARLY, DECISIVELY, VERY_CLEARLY = 1.25, 1.5, 2.0  # times smaller differences
 SIGNIFICANT, TOLD_APART = 6.0, 5.0  # standard deviations by which one convention of angles is likelier than another
 BY_CHANCE = 3.0  # standard deviations by which the squares of noise may exceed what was stated
 LONG_TAIL = 4.0  # median sizes; differences beyond are wrong readings
@@ -125,8 +125,8 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
             size = _rms(medians(left, len(there.y)))
             way = _Way(VERY_CLEARLY * size, size, "", AS_GIVEN, order, np.ones(robot.m))
             if step:
-                ways = (one for one in _explanations(there, left[:, : len(there.y)], noise)[0] if one.way.of_readings)
-                way = min(ways, default=way, key=lambda one: one.weighted)
+                others = (one for one in _explanations(there, left[:, : len(there.y)], noise)[0] if one.way.of_readings)
+                way = min(others, default=way, key=lambda one: one.weighted)
             left_before, factors = min(as_given, best.size * best.way.factor), way.signs * way.way.factor
             if step and step < LAST_STEP:  # with scales that are known, the frames are found more exactly
                 part = log._replace(y=log.y[:, way.columns] * factors)
@@ -137,8 +137,16 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     if named:
         whole = log._replace(position=position, rotation=rotation, angles=angles, carriers=carriers)
         factors = best.signs * best.way.factor
-        corrected = None if best.several else _corrected(given, *whole.at(best.way), best.columns, factors)
-        return Mistake(_better(best.text, as_given, best.size), corrected, factors=factors)
+        # Scales that are fitted explain a part of any log; what is left may be due to a wrong explanation.
+        rival = min((way for way in ways if way.text not in ("", best.text)), default=best, key=lambda way: way[:2])
+        fitted = best.way.factor not in (1.0, *FACTORS)
+        open_ = far and fitted and best is not rival and rival.weighted < DECISIVELY * best.weighted
+        text = _better(best.text, as_given, best.size)
+        if open_:
+            text = f"{text}; but something else explains them nearly as well: {rival.text}"
+        several = best.several or open_
+        corrected = None if several else _corrected(given, *whole.at(best.way), best.columns, factors)
+        return Mistake(text, corrected, factors=factors)
     return None if far or not framed else _displaced(log, given, noise)
 
 

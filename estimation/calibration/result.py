@@ -21,7 +21,7 @@ from .geometry import length_of
 from .outliers import Outlier, Slip
 from .parameters import OF_ROBOT
 from .plausibility import Mistake
-from .solving import Solved, covariance_of, inflation_of, is_still, lengths_of, noise_of
+from .solving import Noise, Solved, covariance_of, inflation_of, is_still, lengths_of, noise_of
 
 EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
 FAR = 5.0  # standard deviations of the prior
@@ -165,7 +165,7 @@ class CalibrationData(Displayed):
         It is zero along unobservable directions. It is scaled up if residuals are larger than stated or autocorrelated
         (`noise`, `autocorrelation`).
         """
-        return covariance_of(self._solved) * self._inflation
+        return covariance_of(self._solved, self._noise)
 
     @cached_property
     def information(self) -> np.ndarray:
@@ -173,20 +173,16 @@ class CalibrationData(Displayed):
 
         It is the pseudo-inverse of the covariance, factors `noise` and `autocorrelation` included.
         """
-        return self._solved.observability.information / self._inflation
-
-    @property
-    def _inflation(self) -> float:
-        return inflation_of(self._noise)
+        return self._noise.information
 
     @cached_property
-    def _noise(self) -> tuple[float, float, int]:
+    def _noise(self) -> Noise:
         return noise_of(self._solved)
 
     @property
     def noise(self) -> float:
         """Return the standard deviation of a length estimated from the residuals [m]; nan without redundancy."""
-        return self._noise[0] * self.stated_sigma
+        return self._noise.excess * self.stated_sigma
 
     @property
     def stated_sigma(self) -> float:
@@ -196,7 +192,7 @@ class CalibrationData(Displayed):
     @property
     def autocorrelation(self) -> float:
         """Return the factor of the covariance for autocorrelated errors and undetected wrong readings, else 1."""
-        return self._noise[1]
+        return self._noise.autocorrelation
 
     @property
     def identifiable(self) -> tuple[str, ...]:
@@ -276,7 +272,7 @@ class CalibrationData(Displayed):
         clocks = self._solved.clocks
         if clocks is None:
             return ()
-        sigmas = np.sqrt(np.diag(clocks.covariance) * self._inflation)
+        sigmas = np.sqrt(np.diag(clocks.covariance) * inflation_of(self._noise))
         return tuple(
             Parameter(f"{self.file.carriers[i].name}.clock", float(ahead), float(sigma), float(ahead), "s")
             for i, ahead, sigma in zip(clocks.carriers, clocks.ahead, sigmas, strict=True)

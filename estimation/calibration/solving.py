@@ -11,6 +11,7 @@ from ...models.robot import Robot
 from ..logs.cable_directions import placed
 from ..logs.measurements import Measurements, measured_poses, tracked
 from ..logs.pose_track import PoseTrack
+from .autocorrelation import information_of
 from .balance import Balance
 from .carrier_clocks import CarrierClocks, has_carrier_clocks, with_carrier_clocks
 from .carrier_motion import CarrierMotion
@@ -20,13 +21,15 @@ from .geometry import length_of
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
 from .observability import Observability
-from .outliers import LEAST_THRESHOLD, Outlier, Slip, autocorrelation, find_outliers, find_slips, find_unbalanced
+from .outliers import LEAST_THRESHOLD, Outlier, Slip, by_left_out, find_outliers, find_slips, find_unbalanced
 from .parameters import IN_BALANCE, OF_ROBOT, Parameters
-from .pose_noise import observed
+from .pose_noise import keeping, observed
 from .sightings import sighted
 from .starts import LARGEST_SHARE, fit_from, level_poses
 
 WINDING = 10.0  # standard deviations of readings that change, and so show a clock offset
+LOOSE, LOOSE_SHARE = 0.1, 0.03  # [m] of standard deviation, and share of the cables' length: files are usually better
+NEARLY_LOOSE = 0.01  # of the variance, below which residuals are never large enough to make it so large
 EXCEEDS = 0.05  # by which residuals may exceed the stated sigma, beside chance
 
 ROUNDS = 30  # of fits, each without the wrong readings of those before
@@ -46,6 +49,23 @@ class Solved(NamedTuple):
     slips: tuple[Slip, ...]
     observability: Observability
     clocks: CarrierClocks | None = None
+
+
+class Noise(NamedTuple):
+    """The noise of a fit, and what it makes of the parameters.
+
+    Attributes:
+        excess: Ratio of residuals to their sigmas: root of the sum of squares over the redundancy; nan without any.
+        autocorrelation: Factor of the variances because errors are autocorrelated, or wrong but unseen.
+        redundancy: Number of readings minus number of unknowns, of which priors determine a part.
+        covariance, information: Those of the parameters, in metres, (p, p), zero along unobservable directions.
+    """
+
+    excess: float
+    autocorrelation: float
+    redundancy: float
+    covariance: np.ndarray
+    information: np.ndarray
 
 
 def usual(robot: Robot, measurements: Measurements) -> tuple[str, ...]:
@@ -121,11 +141,39 @@ def solve(
         model = replace(model, weights=model.weights & ~left)
         result, fitted = fit(model, result.state, length), model.weights
     model, result = _weighed(model, result, length, True)
+    model, result = _determined(model, result, length)
     if clocks is not None:
         model, result, clocks = with_carrier_clocks(model, result, measurements, clocks, length)
     seen = observed(model, result.state, length)
     seen = seen if clocks is None else clocks.widened(seen)
     return Solved(model, result, tuple(wrong.values()), tuple(slips), seen, clocks)
+
+
+def _determined(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
+    """Return the model that keeps the file's values where the log knows ends of cables and offsets worse, and its fit.
+
+    A prior would hold them, so this is done without one.
+    """
+    of = model.parameters
+    lengths = np.flatnonzero(np.array(of.units)[of.varies] == "m")
+    lengths = lengths[np.flatnonzero(of.varies)[lengths] < of.clock]
+    block, limit = np.ix_(lengths, lengths), min(LOOSE, LOOSE_SHARE * length) ** 2
+    for _ in range(0 if model.prior or not lengths.size else ROUNDS_OF_WEIGHTS):
+        seen = observed(model, result.state, length)
+        if np.linalg.eigvalsh(seen.covariance[block])[-1] < NEARLY_LOOSE * limit:
+            break
+        values, vectors = np.linalg.eigh(noise_of(Solved(model, result, (), (), seen)).covariance[block])
+        if values[-1] <= limit:
+            break
+        loose = np.zeros((len(seen.covariance), int((values > limit).sum())))
+        loose[lengths] = vectors[:, values > limit]
+        kept, state = keeping(model, result.state, loose)
+        found, scale = fit(kept, state, length), metric(model)
+        before, after = (np.linalg.norm((one.state.x - of.first) * scale) for one in (result, found))
+        if after > before or not found.converged or (of.table(found.state.x)[:, 8] < 0).any():
+            break
+        model, result = kept, found
+    return model, result
 
 
 def _with_slip(model: Model, result: Fit, slip: Slip, length: float) -> tuple[Model, Fit, np.ndarray]:
@@ -280,24 +328,34 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
         )
 
 
-def noise_of(solved: Solved) -> tuple[float, float, int]:
-    """Return the ratio of residuals to their sigmas, the factor `autocorrelation`, and the redundancy.
+def noise_of(solved: Solved) -> Noise:
+    """Return the noise of a fit.
 
-    The first is the square root of the sum of squares over the redundancy: number of readings minus number of unknowns.
+    Errors e of the readings with the covariance W and exact priors D give the parameters, of normal matrix H = J'J + D,
+    the covariance H^-1 (J'W J + D) H^-1. Where unknown poses have noise, the observability widens it.
     """
-    model, state = solved.model, solved.fit.state
+    model, state, seen = solved.model, solved.fit.state, solved.observability
     inside = model.inside(state)
     spare = (model.weights & inside).sum(axis=0) + sighted(model.measurements) * inside
     if model.balanced:
         spare = spare + model.balanced.equations * (inside if model.unbalanced is None else inside & ~model.unbalanced)
     spare = spare - (np.isinf(model.pose_sigmas)).sum(axis=1)  # a pose with a finite sigma is an equation, too
-    priors = np.isfinite(model.prior_sigmas[model.parameters.varies])
-    found = solved.observability.rank
-    redundancy = int(np.maximum(spare, 0).sum()) + int(priors.sum()) - found
+    varies = model.parameters.varies
+    sigmas, moved = model.prior_sigmas[varies], (state.x - model.parameters.first)[varies]
+    values, vectors = np.linalg.eigh(seen.inverse)
+    V, roots = vectors[:, len(values) - seen.rank :], np.sqrt(np.maximum(values[len(values) - seen.rank :], 0.0))
+    D = (V * roots).T @ ((V * roots) / (sigmas * metric(model)[varies])[:, None] ** 2)
+    redundancy = int(np.maximum(spare, 0).sum()) - seen.rank + float(np.trace(D))
     if redundancy <= 0:
-        return np.nan, 1.0, redundancy
-    excess = float(np.sqrt(solved.fit.cost / redundancy))
-    return excess, autocorrelation(model, state, solved.observability.inverse, found, excess), redundancy
+        return Noise(np.nan, 1.0, redundancy, seen.covariance, seen.information)
+    excess = float(np.sqrt(max(solved.fit.cost - float(((moved / sigmas) ** 2).sum()), 0.0) / redundancy))
+    M, more = information_of(model, state, V * roots, np.eye(seen.rank) - D)
+    lost = by_left_out(model, state)
+    larger = (excess**2 if excess > 1 + EXCEEDS else 1.0) * lost
+    shares, turn = np.linalg.eigh((V / roots).T @ seen.covariance @ (V / roots))
+    wide = (turn * np.sqrt(np.maximum(shares, 0.0))) @ turn.T
+    spread = roots[:, None] * (wide @ (larger * M + D) @ wide) * roots
+    return Noise(excess, more * lost, redundancy, V @ spread @ V.T, V @ np.linalg.inv(spread) @ V.T)
 
 
 def cleaned(solved: Solved) -> tuple[Measurements, np.ndarray]:
@@ -314,14 +372,15 @@ def lengths_of(model: Model, state: State) -> np.ndarray:
     return (every.residuals(state).readings * model.measurements.sigma.lengths).T
 
 
-def inflation_of(noise: tuple[float, float, int]) -> float:
-    """Return the factor of the covariance, from `noise_of`: for residuals larger than stated, or autocorrelated."""
-    excess, autocorrelation, _ = noise
-    return (excess**2 if excess > 1 + EXCEEDS else 1.0) * autocorrelation if np.isfinite(excess) else 1.0
+def inflation_of(noise: Noise) -> float:
+    """Return the factor of a covariance without priors, for residuals larger than stated, or autocorrelated."""
+    if not np.isfinite(noise.excess):
+        return 1.0
+    return (noise.excess**2 if noise.excess > 1 + EXCEEDS else 1.0) * noise.autocorrelation
 
 
-def covariance_of(solved: Solved) -> np.ndarray:
-    """Return the covariance of the parameters, (p, p), in their order and units [m, 1, s], without its inflation."""
+def covariance_of(solved: Solved, noise: Noise) -> np.ndarray:
+    """Return the covariance of the parameters, (p, p), in their order and units [m, 1, s]."""
     scale = metric(solved.model)[solved.model.parameters.varies]
-    covariance = solved.observability.covariance / scale[:, None] / scale
+    covariance = noise.covariance / scale[:, None] / scale
     return (covariance + covariance.T) / 2
