@@ -34,14 +34,18 @@ UNDECIDED = 0.05  # of a tolerance: less than that beyond it is not looked for
 def _corners(seen: Instants) -> np.ndarray:
     """Return the instants at corners of the motion, and just before its jumps, (k,).
 
-    It jumps where its load or the acceleration of a time law may. Of laws there is an instant between two jumps too.
+    It jumps where its load or the acceleration of a time law may. Of laws there is an instant between two jumps too,
+    and of pieces of a path that are as short as the time between a few instants there are as many inside.
     """
     scenario, nodes = seen.scenario, np.zeros(0) if seen.deviation is None else seen.deviation.nodes
-    laws = np.concatenate([[], *(path.jumps() for path in (scenario.path, *scenario.carrier_paths.values()))])
-    laws, duration = np.unique(laws), float(seen.times[-1])
+    paths = scenario.path, *scenario.carrier_paths.values()
+    step, duration = seen.times[1] - seen.times[0], float(seen.times[-1])
+    laws = np.unique(np.concatenate([[], *(path.jumps() for path in paths)]))
     jumps = np.unique(np.concatenate([laws, scenario.phases.boundaries]))
-    corners = np.unique(np.concatenate([nodes, jumps, (laws[1:] + laws[:-1]) / 2]))
-    step = seen.times[1] - seen.times[0]
+    begin, end = np.concatenate([path.pieces(duration) for path in paths]).T
+    short = end - begin < PARTS * step
+    inside = np.linspace(begin[short], end[short], PARTS + 1).ravel()
+    corners = np.unique(np.concatenate([nodes, jumps, (laws[1:] + laws[:-1]) / 2, inside]))
     corners = corners[np.abs(corners - np.round(corners / step) * step) > APART * step]
     corners = np.concatenate([corners, jumps - BESIDE * duration])
     return np.unique(corners[(corners > 0.0) & (corners < duration)])

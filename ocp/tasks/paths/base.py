@@ -95,6 +95,10 @@ class PathBase(Part):
         """Return the times at which a time law of its own may change its acceleration abruptly, (n,) [s]."""
         return np.zeros(0)
 
+    def pieces(self, duration: float) -> np.ndarray:
+        """Return when pieces of the motion begin and end that may show nowhere else, (n, 2) [s]."""
+        return np.zeros((0, 2))
+
     def stations(self, duration: float) -> Stations:
         """Return the poses through which a task that lasts `duration` [s] should pass; none by default."""
         return Stations()

@@ -92,10 +92,14 @@ class Legs:
             return self._times
         return np.append(0.0, np.cumsum(self._between * self.scale(duration) + self._dwell[:-1]))
 
+    def legs(self, duration: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return when each leg begins, and how long it lasts, (n - 1,) [s]."""
+        last = self._last * self.scale(duration)
+        return self.knots(duration)[:-1] + self._dwell[:-1] - self._early * last, last
+
     def at(self, times: np.ndarray, duration: float) -> Motion:
         """Return the motion of a task that lasts `duration` [s] at `times` [s]."""
-        last = self._last * self.scale(duration)
-        start = self.knots(duration)[:-1] + self._dwell[:-1] - self._early * last
+        start, last = self.legs(duration)
         leg = np.minimum(np.searchsorted(start + last, times, side="right"), len(last) - 1)
         # After the last leg comes one that never starts.
         start, last = np.append(start, np.inf), np.append(last, 1.0)

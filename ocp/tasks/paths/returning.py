@@ -52,6 +52,10 @@ class ReturnPath(PathBase):
         return self.path.jumps() - self.start
 
     @override
+    def pieces(self, duration: float) -> np.ndarray:
+        return self.path.pieces(self.duration) - self.start
+
+    @override
     def stations(self, duration: float) -> Stations:
         return self.path.stations(self.duration).since(self.start)
 

@@ -78,6 +78,11 @@ class SequencePath(PathBase):
         return np.concatenate([start + part.path.jumps() for part, start in parts])
 
     @override
+    def pieces(self, duration: float) -> np.ndarray:
+        parts = zip(self.parts, self.boundaries, strict=False)
+        return np.concatenate([start + part.path.pieces(part.seconds) for part, start in parts])
+
+    @override
     def stations(self, duration: float) -> Stations:
         parts = zip(self.parts, self.boundaries, strict=False)
         return Stations.joined(

@@ -190,6 +190,13 @@ class WaypointPath(PathBase):
             return duration * np.array(self.shares)
         return self._spline.knots(duration) if self.shape == "spline" else self._legs.knots(duration)
 
+    @override
+    def pieces(self, duration: float) -> np.ndarray:
+        if self.shape == "spline":
+            return super().pieces(duration)
+        start, last = self._legs.legs(duration if self.shares is None else 1.0)
+        return np.stack([start, start + last], axis=1) * (1.0 if self.shares is None else duration)
+
     @property
     def places(self) -> np.ndarray:
         """Return s of its points, (n,)."""
