@@ -97,7 +97,11 @@ def information_of(model: Model, state: State, root: np.ndarray, white: np.ndarr
     own = sum(sums) / usual
     if count >= FEWEST and own > factor * (1 + BY_CHANCE * np.sqrt(4 * max(map(len, r)) / (count * usual))):
         M, factor = M * own / factor, own
-    return (M, factor) if factor > 1 else (white, 1.0)
+    if factor <= 1:
+        return white, 1.0
+    values, vectors = np.linalg.eigh(M)  # a sum of finitely many lags may be negative somewhere
+    least = np.einsum("ri,rs,si->i", vectors, white, vectors)
+    return (vectors * np.maximum(values, least)) @ vectors.T, factor
 
 
 def _joined(held: list[list[_Kind]]) -> list[_Kind]:

@@ -152,6 +152,8 @@ def solve(
 def _determined(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
     """Return the model that keeps the file's values where the log knows ends of cables and offsets worse, and its fit.
 
+    These are directions with a standard deviation beyond the limit along which the fit went farther than that.
+
     A prior would hold them, so this is done without one.
     """
     of = model.parameters
@@ -167,6 +169,9 @@ def _determined(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
             break
         loose = np.zeros((len(seen.covariance), int((values > limit).sum())))
         loose[lengths] = vectors[:, values > limit]
+        away = ((result.state.x - of.first) * metric(model))[of.varies] @ loose
+        if away @ away <= limit:
+            break  # about where the file has them
         kept, state = keeping(model, result.state, loose)
         found, scale = fit(kept, state, length), metric(model)
         before, after = (np.linalg.norm((one.state.x - of.first) * scale) for one in (result, found))

@@ -3,11 +3,12 @@
 from .dynamic import Dynamic
 from .equilibrium_posture import EquilibriumPosture
 from .exists_placement import ExistsPlacement
+from .force_balance import ForceBalance
 from .interference import Interference
 from .lengths import Lengths
 from .margin import Margin
 from .metric import MetricInRange
-from .static_equilibrium import ForceBalance, StaticEquilibrium
+from .static_equilibrium import StaticEquilibrium
 from .wrench_closure import WrenchClosure
 from .wrench_feasible import WrenchFeasible
 from .wrench_with_tolerance import WrenchWithTolerance

@@ -1,4 +1,4 @@
-"""Static equilibrium: tensions inside their limits hold the platform at rest; force balance: without the moments."""
+"""Static equilibrium: tensions inside their limits hold the platform at rest."""
 
 from typing import ClassVar, Literal
 
@@ -29,15 +29,3 @@ class StaticEquilibrium(BalanceAtRest):
     takes_every_row: ClassVar[bool] = True
 
     kind: Literal["static-equilibrium"] = "static-equilibrium"
-
-
-class ForceBalance(BalanceAtRest):
-    """Tensions inside the limits balance the weight as a force; moments are ignored.
-
-    It is the first of paper C's conditions. Three cables balance all six rows exactly only on a set of measure zero, so
-    the paper's step (d) would reject every sample. Its prisms follow from the forces alone.
-    """
-
-    forces_only: ClassVar[bool] = True
-
-    kind: Literal["force-balance"] = "force-balance"
