@@ -323,21 +323,23 @@ def replay(
         again = copy(windows)  # whose starts suit what explains most
         again.start, again.noise = np.zeros_like(windows.start), dict(windows.noise)
         explained = _by_kind(Matching(again, found[0][1].parameters))
-    fitted, validation = _fitted(matching) if fits else (None, None)
+    fitted, validation = _fitted(matching, found[0][0]) if fits else (None, None)
     return Replay(matching, tuple(one for one, _ in found), explained, fitted, validation, largest)
 
 
-def _fitted(matching: Matching) -> tuple[Parameters, tuple[float, float]]:
-    """Fit one parameter after the other, as long as that improves windows that are not fitted."""
+def _fitted(matching: Matching, most: Explanation) -> tuple[Parameters, tuple[float, float]]:
+    """Fit one parameter after the other, as long as that improves windows that are not fitted.
+
+    What explains most must have a place in the file, or else a wrong parameter would be written.
+    """
     number_of = np.arange(len(matching.kept))
     fits = number_of // (BLOCK if len(number_of) > BLOCK else 1) % 2 == 0
     used, others = matching.kept & fits, matching.kept & ~fits
     best, done = matching.first, set[str]()
-    while used.any() and others.any():
+    while used.any() and others.any() and (most.name in ALONE or not most.named):
         found = next(
             (one for one in matching.explanations(best, used) if one[0].named and one[0].name not in done), None
         )
-        # What explains most must have a place in the file, or else a wrong parameter would be written.
         if found is None or found[0].name not in ALONE or found[1].cost[others].sum() > GAIN * best.cost[others].sum():
             break
         done.add(found[0].name)

@@ -1,4 +1,4 @@
-"""`Parameters` and `modelled`: the robot of a replay, and what it may have wrong."""
+"""`Parameters`, `modelled`, `lags_of`: the robot of a replay, its drives, and what may be wrong in its file."""
 
 from typing import Any, NamedTuple
 
@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from ..models.robot import Robot
 
+QUICK = 400.0  # [rad/s]: that of core/plant/winch_forces.h
 STRAIN = 1e-3  # at t_max, of cables whose stiffness is not known
 
 
@@ -61,3 +62,16 @@ def changed(robot: Robot, to: Parameters) -> Robot:
     platform = robot.platform.model_copy(update={"mass": robot.platform.mass * to.mass})
     gravity = Rotation.from_rotvec([*to.tilt, 0.0]).apply(robot.gravity) if any(to.tilt) else robot.gravity
     return robot.model_copy(update={"cables": tuple(cables), "platform": platform, "gravity": tuple(gravity)})
+
+
+def lags_of(robot: Robot) -> np.ndarray:
+    """Return the lag with which drives that know their winch give tensions, (m,) [s], see core/plant/winch_forces.h.
+
+    Tensions of cables that do not stretch are given at once.
+    """
+    lags, lengths = np.zeros(robot.m), np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1)
+    for i, cable in enumerate(robot.cables):
+        if cable.winch and cable.stiffness:
+            K = cable.stiffness / lengths[i]
+            lags[i] = 2 / max(QUICK, np.sqrt(K / cable.winch.inertia)) - (cable.damping or 0.0) / K
+    return lags.clip(0.0)

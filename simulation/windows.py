@@ -17,11 +17,10 @@ from ..estimation.logs.recording import GAP
 from ..estimation.logs.smoothing import noise_of, smooth, widest_parabola
 from ..models import points
 from ..models.dynamics import dynamics_of
-from ..models.robot import Robot
 from ..plant import Plant, layout
 from ..plant.periods import Periods
 from ..plant.steps import steps_in
-from .replayed_robot import Parameters, changed, friction_of, modelled
+from .replayed_robot import Parameters, changed, friction_of, lags_of, modelled
 
 STEP = 2e-3  # [s] of the simulation
 MARGIN = 0.05  # [s] of a recording before its first window, and longest gap that is none
@@ -30,7 +29,6 @@ FEWEST = 5  # samples of a window
 SLOW = 0.01  # [m/s] of a cable, below which friction is less than its value at higher speeds
 NUDGE = 1e-4, 1e-3  # [m, rad] and [m/s, rad/s], by which starts are varied
 SLOPE = 8.0  # deviation of a smoothed slope, about twice that of white noise, over noise / (n^1.5 dt)
-QUICK = 400.0  # [rad/s]: that of core/plant/winch_forces.h
 FLOOR = {"position": 2e-5, "rotation": 2e-5, "tensions": 1e-2, "lengths": 1e-5}  # of noise
 
 
@@ -103,7 +101,7 @@ class Windows:
             if self.drive == "forces" and not all(cable.winch for cable in robot.cables):
                 self.drive = "tensions"
             elif self.drive == "tensions":
-                self._lags = _lags(robot)
+                self._lags = lags_of(robot)
         else:
             elastic = all(cable.stiffness for cable in robot.cables)
             wanted = [drive] if drive in kinds else [*(["lengths"] if elastic else []), "tensions", "lengths"]
@@ -382,19 +380,6 @@ class Windows:
         self.widths = [part.shape[-1] for part in parts.values()]
         whole = np.concatenate([part / self.noise[name] for name, part in parts.items()], axis=-1)
         return whole.reshape(*whole.shape[:2], -1)
-
-
-def _lags(robot: Robot) -> np.ndarray:
-    """Return the lag with which drives that know their winch give tensions, (m,) [s], see core/plant/winch_forces.h.
-
-    Tensions of cables that do not stretch are given at once.
-    """
-    lags, lengths = np.zeros(robot.m), np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1)
-    for i, cable in enumerate(robot.cables):
-        if cable.winch and cable.stiffness:
-            K = cable.stiffness / lengths[i]
-            lags[i] = 2 / max(QUICK, np.sqrt(K / cable.winch.inertia)) - (cable.damping or 0.0) / K
-    return lags.clip(0.0)
 
 
 def _seen(plant: Plant, states: np.ndarray, tensions: np.ndarray) -> np.ndarray:

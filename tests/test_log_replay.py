@@ -230,11 +230,12 @@ def test_what_is_wrong_is_named_first(kind, name, robot, options, truth, logs):
     assert f"{name} explains" in result.report().splitlines()[0]
 
 
-@pytest.mark.parametrize(("gain", "zero"), [(1.2, 0.0), (1.0, 10.0)])
-def test_a_wrong_load_cell_is_neither_mass_nor_stiffness(gain, zero, tmp_path):
+@pytest.mark.parametrize(("gain", "zero", "drive"), [(1.2, 0.0, None), (1.0, 10.0, None), (1.2, 0.0, "tensions")])
+def test_a_wrong_load_cell_is_neither_mass_nor_stiffness(gain, zero, drive, tmp_path):
+    """It is found if readings are compared with the simulation, and if they are its commands."""
     found = columns("lengths", every("lengths"))
     found["tension_1 [N]"] = gain * found["tension_1 [N]"] + zero
-    result = replay(PLANAR, written(tmp_path / "log.csv", found), fit=gain > 1)
+    result = replay(PLANAR, written(tmp_path / "log.csv", found), drive=drive, fit=gain > 1)
     assert result.named == ["load_cells"]
     gains, zeros = np.reshape(result.found[0].value, (2, -1))
     sigmas = np.reshape(result.found[0].sigma, (2, -1))
