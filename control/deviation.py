@@ -1,6 +1,6 @@
 """`Deviation`: whether platforms are away from their reference, so far that no step may be called as planned.
 
-So far is also the position error with which a simulation passes by default (`tolerance_of`).
+The largest distance is also the position error with which a simulation passes by default (`tolerance_of`).
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ from ..models.points import rotations
 from ..models.robot import Robot
 from .command import OFF, PLANNED, SHIFTED
 
-FAR, MOST = 0.05, 0.05  # position: of the mean length of the cables at home, and at most [m]
+FAR, MOST = 0.05, 0.05  # position: share of the mean length of the cables at home, and at most [m]
 TURNED = 0.5  # [rad], of the rotation between the two
 END, END_MOST, END_TURNED = 0.02, 0.1, 0.1  # the same for errors at the end of a prediction
 LEFT = 0.5  # share of a larger error that a prediction may leave

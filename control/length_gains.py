@@ -88,9 +88,7 @@ class LengthGains:
         2 q - y, with q' = a (y - q).
         """
         n, parts = len(self._G), PARTS * (age > 0)
-        x, v, u, *q, last = np.eye((4 + parts) * n).reshape(
-            4 + parts, n, -1
-        )  # the last: u' in a period, or z before it
+        x, v, u, *q, last = np.eye((4 + parts) * n).reshape(4 + parts, n, -1)  # last: u' in a period, or z before it
         y, changes = x, []
         for state in q:
             changes.append(2 * PARTS / age * (y - state))

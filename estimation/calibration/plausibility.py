@@ -137,7 +137,7 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     if named:
         whole = log._replace(position=position, rotation=rotation, angles=angles, carriers=carriers)
         factors = best.signs * best.way.factor
-        # Scales that are fitted explain a part of any log; what is left may be due to a wrong explanation.
+        # Fitted scales reduce the differences of any log; the remainder may be due to a wrong explanation.
         rival = min((way for way in ways if way.text not in ("", best.text)), default=best, key=lambda way: way[:2])
         fitted = best.way.factor not in (1.0, *FACTORS)
         open_ = far and fitted and best is not rival and rival.weighted < DECISIVELY * best.weighted

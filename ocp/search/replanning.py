@@ -120,7 +120,7 @@ def final_of(plan: Plan) -> Final | None:
 def remainder(
     whole: Scenario, final: Final | None, last: Plan, begun: float, time: float, initial: Initial, settle: float
 ) -> tuple[Scenario, Deviation | None]:
-    """Lay out what is left of the motion of `whole` at `time` [s] for a robot in the state `initial`.
+    """Lay out the rest of the motion of `whole` from `time` [s] on, for a robot in the state `initial`.
 
     `final` is how it ends, beside what its task requires, and `last` the plan that the robot followed, which `begun` at
     that time [s]. The way back to the path takes `settle` [s] at most. The second result is the last plan, with the

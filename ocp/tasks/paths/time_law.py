@@ -59,7 +59,7 @@ class TimeLaw:
 class SmoothedLaw:
     """The mean of a law over the last `window`: it starts, stops and ends without acceleration.
 
-    Where the law rests it waits for as long, so that the mean rests there too.
+    It waits for this time wherever the law rests, so that the mean rests there too.
 
     - `law`: the law.
     - `window`: time over which the mean is taken [s].
