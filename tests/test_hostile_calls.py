@@ -81,7 +81,6 @@ NOT_CALLED = {
     "Parameter",
     "Sigma",
     "Slip",
-    "StiffestTensions",
     "ANSWERS",
     "METRICS",
     "Command",  # what an author of a controller gets and writes
