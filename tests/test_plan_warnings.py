@@ -210,6 +210,21 @@ def test_the_same_robot_in_other_sizes_is_not_doubted():
         assert not slipped_units(Robot.model_validate(data), Task.model_validate(task))
 
 
+def test_a_crane_may_hoist_by_many_times_the_distance_of_its_cables():
+    cables = [{"carrier": "frame", "anchor": [x, 0, 12], "attachment": [x, 0, 0.3]} for x in (-0.5, 0.5)]
+    crane = {
+        "name": "crane",
+        "source": "test",
+        "platform": {"mass": 500, "dof": ["z"], "home": [0, 0, 5, 0, 0, 0]},
+        "carriers": [{"name": "frame", "kind": "ground"}],
+        "cables": [cable | {"t_min": 100, "t_max": 6000} for cable in cables],
+    }
+    hoist = {"path": {"kind": "line", "start": [0, 0, 2], "end": [0, 0, 8]}, "duration": 6}
+    assert not slipped_units(Robot.model_validate(crane), Task.model_validate(hoist))
+    hoist["path"]["end"] = [0, 0, 800]
+    assert "centimetres" in " ".join(slipped_units(Robot.model_validate(crane), Task.model_validate(hoist)))
+
+
 WEEK = sorted((Path(__file__).parents[1] / "examples/week").glob("*.yaml"))
 
 

@@ -66,6 +66,12 @@ def optimal_duration(robot, path, intervals, margin=0.0):
     rest = dynamics.required_wrench(pose, 0 * pose, 0 * pose)[:, rows]
     inertia = dynamics.required_wrench(pose, 0 * pose, first)[:, rows] - rest
     motion = dynamics.required_wrench(pose, first, second)[:, rows] - rest
+    h_s = 1e-3 * h  # of differences of the lengths
+    around = [
+        dynamics.cable_lengths(path.by_fraction((np.arange(intervals) + 0.5) * h + by)[0]) for by in (-h_s, 0, h_s)
+    ]
+    slope, bend = (around[2] - around[0]) / (2 * h_s), (around[2] - 2 * around[1] + around[0]) / h_s**2
+    reflected = np.array([cable.winch.inertia if cable.winch else 0.0 for cable in robot.cables])[:, None]
     speed = ca.MX.sym("speed", intervals + 1)
     tensions = ca.MX.sym("tensions", robot.m, intervals)
     square = speed**2
@@ -73,12 +79,19 @@ def optimal_duration(robot, path, intervals, margin=0.0):
     given = ca.horzcat(*[A[k] @ tensions[:, k] for k in range(intervals)])
     needed = ca.DM(inertia.T) * ca.repmat(u.T, len(rows), 1) + ca.DM(motion.T) * ca.repmat(x.T, len(rows), 1)
     gap = (given - needed - ca.DM(rest.T)) / robot.force_scale
-    program = {"x": ca.veccat(speed, tensions), "f": ca.sum1(2 * h / (speed[1:] + speed[:-1])), "g": ca.vec(gap)}
+    paid_out = ca.DM(reflected * slope.T) * ca.repmat(u.T, robot.m, 1) + ca.DM(reflected * bend.T) * ca.repmat(
+        x.T, robot.m, 1
+    )
+    motors = np.array([cable.winch.tension_max if cable.winch else 1e6 for cable in robot.cables])
+    rows = ca.veccat(gap, (tensions - paid_out) / robot.force_scale)
+    most = np.append(np.zeros(gap.numel()), np.tile(motors / robot.force_scale, intervals))
+    duration = ca.sum1(2 * h / (speed[1:] + speed[:-1]))
+    program = {"x": ca.veccat(speed, tensions), "f": duration, "g": rows}
     solver = ca.nlpsol("time", "ipopt", program, {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes"})
     low = np.concatenate([[0.0], np.full(intervals - 1, 1e-4), [0.0], np.tile(robot.t_min + margin, intervals)])
     high = np.concatenate([[0.0], np.full(intervals - 1, np.inf), [0.0], np.tile(robot.t_max - margin, intervals)])
     start = np.concatenate([np.full(intervals + 1, 0.5), np.tile((robot.t_min + robot.t_max) / 2, intervals)])
-    found = solver(x0=start, lbx=low, ubx=high, lbg=0, ubg=0)
+    found = solver(x0=start, lbx=low, ubx=high, lbg=-most, ubg=most)
     assert solver.stats()["success"]
     return float(found["f"])
 
@@ -137,6 +150,36 @@ def test_minimum_time_on_a_line_agrees_with_an_optimal_control_program():
         best = optimal_duration(robot, path.model_copy(update={"timing": "uniform"}), 200, margin)
         assert timing.feasible
         assert timing.duration == pytest.approx(best, rel=0.01)
+
+
+@pytest.mark.parametrize("share", [0.3, 1.0])
+def test_motors_of_winches_give_the_minimum_time_of_an_optimal_control_program(share):
+    """Their inertia is `share` of the mass of the platform; every second motor can do more than its cable."""
+    data = load("ipanema-1").model_dump()
+    mass = data["platform"]["mass"] * share
+    data["cables"] = [
+        cable | {"winch": {"inertia": mass / 8, "force_max": cable["t_max"] * (0.5 + 0.6 * (i % 2)), "speed_max": 9}}
+        for i, cable in enumerate(data["cables"])
+    ]
+    robot = Robot.model_validate(data)
+    path = straight(robot, [0.6, 0.4, 0.3, 0, 0, 0])
+    fastest = time_along(robot, along(path))
+    assert fastest.feasible
+    best = optimal_duration(robot, path.model_copy(update={"timing": "uniform"}), 200)
+    assert fastest.duration == pytest.approx(best, rel=0.005)
+    assert any("winch_force" in each.limit for each in fastest.law.bottlenecks)
+
+
+def test_of_two_cables_the_one_without_a_motor_pulls_what_a_motor_cannot():
+    """A motor that accelerates its winch, and a cable beside it that takes the remainder of the load."""
+    mass, inertia, force, height = 2.0, 3.0, 40.0, 1.5
+    data = point_mass([[0, 0, 4], [0, 0, 4]], ["z"], mass=mass, t_min=1.0, t_max=40.0).model_dump()
+    data["cables"][0]["winch"] = {"inertia": inertia, "force_max": force, "speed_max": 99.0}
+    robot = Robot.model_validate(data)
+    fastest = time_along(robot, along(straight(robot, [0, 0, height, 0, 0, 0])))
+    up, down = (40 + force - mass * GRAVITY) / (mass + inertia), GRAVITY - 2 / mass
+    assert fastest.feasible
+    assert fastest.duration == pytest.approx(np.sqrt(2 * height * (1 / up + 1 / down)), rel=2e-4)
 
 
 def test_minimum_time_on_a_curve_agrees_with_an_optimal_control_program():

@@ -15,6 +15,7 @@ from ..tasks.deviation import Deviation
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 from .by_phase import distribution, taken_up
+from .motors import within_motors
 from .tensions import in_all_winds, scaled, with_all_loads
 
 OF_INSTANTS = (
@@ -84,7 +85,12 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
     off_path = scenario.off_path(times, motion, carriers)
     cases = [(scaled(scenario, its), tensions) for its, tensions in ((w, result.tensions), *result.others)]
     other_w, other_tensions = (np.stack(each, axis=1)[:, 1:] for each in zip(*cases, strict=True))
-    limited = zip(scenario.limits, scenario.limits.along(motion, carriers, result.tensions, off_path), strict=True)
+    limited = scenario.limits.along(motion, carriers, result.tensions, off_path)
+    if not scenario.phases.rest:
+        chosen = within_motors(scenario, times, scaled(scenario, A), cases[0], limited)
+        if chosen is not result.tensions:
+            result = result._replace(tensions=chosen)
+            limited = scenario.limits.along(motion, carriers, chosen, off_path)
     return Instants(
         scenario=scenario,
         deviation=deviation,
@@ -104,7 +110,8 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
         violation=result.violation,
         supports=result.supports,
         values=[
-            np.where(scenario.in_force(limit, times)[:, None], limit.over(times, its), np.nan) for limit, its in limited
+            np.where(scenario.in_force(limit, times)[:, None], limit.over(times, its), np.nan)
+            for limit, its in zip(scenario.limits, limited, strict=True)
         ],
         certificate=certificate,
         beyond=(result.beyond, float(times[result.row or 0])),

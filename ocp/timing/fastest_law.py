@@ -50,7 +50,8 @@ def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: floa
     edges = np.concatenate([np.linspace(0.0, duration, LOOKS + 1), begins, begins + dwell[at_rest]])
     edges = np.unique(np.clip(edges.round(9), 0.0, duration))
     s, sd, sdd = path.law((edges[1:] + edges[:-1]) / 2)
-    platform, carriers = (motion.timed(sd, sdd) for motion in parametrised.at(s))
+    curves = parametrised.at(s)
+    platform, carriers = (motion.timed(sd, sdd) for motion in curves)
     names, shares = [], []
     for each in limits:
         names += [
@@ -61,6 +62,11 @@ def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: floa
     A = parametrised.dynamics.wrench_matrix(platform.pose, carriers.pose)
     w = parametrised.dynamics.required_wrench(*platform, wind=parametrised.wind)
     low, high = parametrised.robot.t_min + margin, parametrised.robot.t_max - margin
+    force = parametrised.motor_force
+    if np.isfinite(force).any():
+        P, Q = parametrised.reflected(*curves)
+        force = force + P * sdd[:, None] + Q * np.square(sd)[:, None]
+    force = np.broadcast_to(force, (s.size, len(high)))
     reached_limits = []
     for k in range(s.size):
         if sd[k] == sdd[k] == 0:
@@ -68,7 +74,8 @@ def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: floa
         elif reached[k].max(initial=0.0) >= REACHED:
             reached_limits.append(names[int(reached[k].argmax())])
         else:
-            reached_limits.append(_tensions(wrench_problem(parametrised.robot, A[k], w[k], low, high)))
+            problem = wrench_problem(parametrised.robot, A[k], w[k], low, np.minimum(high, force[k]))
+            reached_limits.append(_tensions(problem, force[k] < high))
     at, stretches, first = path.law(edges)[0], [], 0
     for limit, run in groupby(reached_limits):
         after = first + len(list(run))
@@ -77,12 +84,16 @@ def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: floa
     return stretches
 
 
-def _tensions(problem: TensionProblem) -> str:
-    """Return which cables are at which limit on the facet nearest to the needed wrench."""
+def _tensions(problem: TensionProblem, motors: np.ndarray) -> str:
+    """Return which cables are at which limit on the facet nearest to the needed wrench.
+
+    `motors`, (m,) of bool, says whose largest tension is what accelerating its winch leaves of the motor's force.
+    """
     pull = capacity_margin(problem).direction @ problem.A
     size = np.abs(pull).max(initial=0.0)
-    at = {"t_min": np.flatnonzero(pull < -PULLS * size), "t_max": np.flatnonzero(pull > PULLS * size)}
-    limits = [f"{name} of {numbered('cable', cables)}" for name, cables in at.items() if cables.size]
+    high = pull > PULLS * size
+    at = {"t_min": pull < -PULLS * size, "t_max": high & ~motors, "winch_force": high & motors}
+    limits = [f"{name} of {numbered('cable', np.flatnonzero(cables))}" for name, cables in at.items() if cables.any()]
     return "; ".join(limits) or "tensions"
 
 

@@ -9,6 +9,7 @@ an acceleration, b that of p'(s) as a velocity and p''(s) as an acceleration. In
 only through the wrench matrix, so their motion along s enters A(s) and, if the path is given in a carrier's frame, p.
 """
 
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -19,6 +20,7 @@ from ...models import Robot
 from ...models.dynamics import dynamics_of
 from ...models.part import COORDINATES
 from ..audits.checks import LENGTH_TOLERANCE
+from ..limits.cables import CableAcceleration
 from ..limits.limit import Magnitude
 from ..limits.limits import Limits
 from ..limits.platform import ZoneSpeed
@@ -88,6 +90,12 @@ class ParametrisedPath:
     def moving(self) -> list[int]:
         """Return the indices of the carriers that move along s."""
         return [index for index, path in self.carriers.items() if not isinstance(path, RestPath)]
+
+    @property
+    def motor_force(self) -> np.ndarray:
+        """Return the largest force of the motor of each winch less friction, (m,) [N]; infinite without a motor."""
+        winches = [cable.winch if self.robot.fixed_lengths is None else None for cable in self.robot.cables]
+        return np.array([winch.tension_max if winch else np.inf for winch in winches])
 
     @property
     def dwell(self) -> dict[float, float]:
@@ -180,15 +188,10 @@ class ParametrisedPath:
         """
         angle = np.arange(SIDES) * 2 * np.pi / SIDES
         around = np.stack([np.cos(angle), np.sin(angle)])  # (2, SIDES)
-        still, along = [np.zeros_like(body.pose) for body in (platform, carriers)], limits.accelerations.along
-        rest = along(Motion(platform.pose, still[0], still[0]), Motion(carriers.pose, still[1], still[1]))
-        first = along(
-            Motion(platform.pose, still[0], platform.velocity), Motion(carriers.pose, still[1], carriers.velocity)
-        )
-        second = along(platform, carriers)
         rows = []
-        for limit, R, P, Q in zip(limits.accelerations, rest, first, second, strict=True):
-            P, Q = P - R, Q - R
+        for limit, (P, Q, R) in zip(
+            limits.accelerations, _parts(limits.accelerations, platform, carriers), strict=True
+        ):
             if not isinstance(limit, Magnitude):  # each value between two bounds
                 a, b, c = (np.hstack([part, -part]) / limit.high for part in (P, Q, R))
                 rows.append((a, b, c - (1 - shrink)))
@@ -199,6 +202,13 @@ class ParametrisedPath:
             a, b, c = (part @ around / limit.high for part in (P, Q, R))
             rows.append((a, b, c - (1 - shrink) * np.cos(np.pi / SIDES)))
         return rows
+
+    def reflected(self, platform: Motion, carriers: Motion) -> tuple[np.ndarray, np.ndarray]:
+        """Return P and Q of the forces P u + Q x that accelerate the winches to pay out cables, (n, m) each [N]."""
+        every = Limits(self.robot, (CableAcceleration(self.robot, 1.0),))
+        P, Q, _ = next(_parts(every, platform, carriers))
+        inertia = np.array([cable.winch.inertia if cable.winch else 0.0 for cable in self.robot.cables])
+        return P * inertia, Q * inertia
 
     def _frame(self) -> bool:
         only = self.robot.carriers[0].name if len(self.robot.carriers) == 1 else None
@@ -244,6 +254,17 @@ class ParametrisedPath:
         )
         still = speed <= max(STILL * speed.max(), SAME)
         _refuse(s, still, "path must move platform or carriers everywhere, as lines, circles and waypoints do", "rest")
+
+
+def _parts(limits: Limits, platform: Motion, carriers: Motion) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Yield the values of each limit of accelerations as P u + Q x + R, (n, k) each, from derivatives by s."""
+    still = [np.zeros_like(body.pose) for body in (platform, carriers)]
+    rest = limits.along(Motion(platform.pose, still[0], still[0]), Motion(carriers.pose, still[1], still[1]))
+    first = limits.along(
+        Motion(platform.pose, still[0], platform.velocity), Motion(carriers.pose, still[1], carriers.velocity)
+    )
+    for R, P, Q in zip(rest, first, limits.along(platform, carriers), strict=True):
+        yield P - R, Q - R, R
 
 
 def _grid(start: float, end: float, intervals: int, bent: bool) -> np.ndarray:

@@ -5,6 +5,7 @@ available wrench set (`solvers.available_wrench`) is a half-plane, as is each li
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,8 +31,9 @@ class PhasePlane(Displayed):
     wrench: Wrench
     available: Facets
     x_max: np.ndarray  # the largest x that the limits of speed allow, (N,) [1/s^2]
-    # limits of accelerations, a u + b x + c <= 0 with (N, k) each
+    # limits of accelerations, also of the winches that a motor can just accelerate, a u + b x + c <= 0 with (N, k) each
     acceleration_rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]]
+    winches: "Winches | None"  # None if none has a motor of its own
 
     def rows(self, weight: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return all limits but x_max as a u + b x + c <= 0, (N, K) each, without units.
@@ -57,6 +59,44 @@ class PhasePlane(Displayed):
         a, b, c = ((normals @ part[:, :, None])[..., 0] / weight for part in self.wrench)
         return np.hstack([a, -a]), np.hstack([b, -b]), np.hstack([c - high / weight, low / weight - c])
 
+    def winch_rows(self, short: "Short", weight: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the half-planes of `tension_rows` where motors that are too `short` for a limit replace it."""
+        if self.winches is None:
+            raise TypeError("no cable has a winch with a motor")
+        pulls, (P, Q) = self.winches.pulls, self.winches.reflected
+        pulls = np.concatenate([pulls, -pulls], axis=1)
+        hauled, eased = np.maximum(pulls, 0.0), np.maximum(-pulls, 0.0)
+        moved = hauled * short.at_max[:, None] - eased * short.at_min[:, None]
+        gap = np.einsum("nkm,nm->nk", hauled, np.where(short.at_max, self.winches.force - self.winches.high, 0.0))
+        gap += np.einsum("nkm,nm->nk", eased, np.where(short.at_min, self.winches.force + self.winches.low, 0.0))
+        a, b, c = self.tension_rows(weight)
+        a, b = (part - np.einsum("nkm,nm->nk", moved, its) / weight for part, its in ((a, P), (b, Q)))
+        return a, b, c - gap / weight
+
+
+class Short(NamedTuple):
+    """The motors that are weaker than their cables at some speeds and accelerations, (N, m) of bool each."""
+
+    at_max: np.ndarray  # cannot pull with t_max, because they accelerate their winches that haul in
+    at_min: np.ndarray  # cannot pay out so fast that the tension is t_min
+
+
+@dataclass(frozen=True)
+class Winches(Displayed):
+    """Limits of the motors of winches, whose forces are the tensions less those that pay out cables, P u + Q x."""
+
+    pulls: np.ndarray  # of all cables along the normals of the facets, (N, K, m)
+    reflected: tuple[np.ndarray, np.ndarray]  # P and Q, (N, m) each [N]
+    force: np.ndarray  # the largest of each motor less friction, (m,) [N]; infinite without a motor
+    low: np.ndarray  # tension limits, (m,) [N]
+    high: np.ndarray  # likewise
+
+    def short(self, u: np.ndarray, x: np.ndarray) -> Short:
+        """Return which motors are too weak for the limits of their cables at u and x, (N,) each."""
+        P, Q = self.reflected
+        moved = P * u[:, None] + Q * x[:, None]
+        return Short(self.force + moved < self.high, moved - self.force > self.low)
+
 
 @dataclass(frozen=True)
 class Proof(Displayed):
@@ -75,12 +115,11 @@ def phase_plane(
     margin: float,
     reserve: np.ndarray | float = 0.0,
     shrink: float = 0.0,
-    weaker: np.ndarray | float = 0.0,
 ) -> PhasePlane:
     """Return the limits at the points s (N,).
 
-    Tensions are less `margin` [N], the largest ones also less `weaker` (m,) [N], wrenches `reserve` (N,) [N] inside
-    what these tensions give, and the other limits reduced by the share `shrink`. Raises `InputError` if motion along
+    Tensions are less `margin` [N], wrenches `reserve` (N,) [N] inside what these tensions give, and the other limits
+    reduced by the share `shrink`. Raises `InputError` if motion along
     the path needs wrenches outside the span of the cables.
     """
     robot = parametrised.robot
@@ -89,14 +128,22 @@ def phase_plane(
     scale = robot.wrench_scale[rows]
     A = parametrised.dynamics.wrench_matrix(platform.pose, carriers.pose)[:, rows] * scale[:, None]
     wrench = Wrench(*(part[:, rows] * scale for part in parametrised.wrench(platform)))
-    available = facets(A, robot.t_min + margin, np.maximum(robot.t_max - margin - weaker, robot.t_min + margin))
+    low, high = robot.t_min + margin, np.maximum(robot.t_max - margin, robot.t_min + margin)
+    available = facets(A, low, high)
     _check_span(s, wrench, available)
+    force, winches = parametrised.motor_force, None
+    rows = parametrised.acceleration_rows(platform, carriers, limits, shrink)
+    if (own := np.isfinite(force)).any():
+        winches = Winches(available.normals @ A, parametrised.reflected(platform, carriers), force, low, high)
+        P, Q = (part[:, own] / robot.force_scale for part in winches.reflected)
+        c = np.append(low[own] - force[own], -high[own] - force[own]) / robot.force_scale
+        rows.append((np.hstack([-P, P]), np.hstack([-Q, Q]), np.broadcast_to(c, (len(s), len(c)))))
     # The reserve must not turn the only wrench into none.
     low, high, inside = available.low, available.high, np.reshape(reserve, (-1, 1))
     middle = (low + high) / 2
     available = replace(available, low=np.minimum(low + inside, middle), high=np.maximum(high - inside, middle))
     x_max = (parametrised.speed_limit(platform, carriers, limits) * (1 - shrink)) ** 2
-    return PhasePlane(wrench, available, x_max, parametrised.acceleration_rows(platform, carriers, limits, shrink))
+    return PhasePlane(wrench, available, x_max, rows, winches)
 
 
 def proofs(parametrised: ParametrisedPath, limits: PathLimits, s: np.ndarray, margin: float) -> list[Proof]:

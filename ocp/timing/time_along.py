@@ -18,8 +18,7 @@ from ...models import Robot
 from ...models.files import AnyRobot, as_robot
 from ..audits.audit import Audit, audit
 from ..audits.excess import TENSIONS
-from ..limits.cables import CableAcceleration, WinchForce
-from ..limits.limit import Limit
+from ..limits.cables import WinchForce
 from ..limits.limits import Limits
 from ..limits.platform import ZoneSpeed
 from ..plan import Plan
@@ -56,6 +55,7 @@ RISE = 2.5  # times 1 / intervals: change of the logarithm of a zone's bound fro
 NEAR_REST = 0.5 ** np.arange(7.0, 0.0, -1.0)  # of the interval beside a rest, where further points are
 CLOSEST = 1e-3  # of a step of a grid: points that are nearer to each other are one
 COARSE_EXCESS = 1e-4  # of a limit: if it is exceeded by more it takes a finer grid, if by less some distance everywhere
+MOST_SHORT = 24  # sets of motors; each adds as many half-planes as the cables have
 PIECES = (400, 800, 1600)  # of a spline through points of a path, until it is near enough
 LOOKS = 20_001
 ON_PATH = 2e-6  # of a path's length: how far that spline may be off
@@ -70,11 +70,11 @@ def time_along(robot: AnyRobot, task: Task | dict[str, Any] | str | os.PathLike[
     other paths the task's duration is ignored. Carriers rest or follow given paths with the same parameter s.
 
     The task's limits on speeds and accelerations of platform, cables and carriers apply, and so do the robot file's
-    limits of winches and of mobile carriers that move. If a winch's inertia needs a large part of its motor's force, a
-    fixed share of the force is kept for it, so that the motion is not the very fastest. The tension limits, reduced by
-    the task's margin, enter as the facets of the available wrench set. TOPP-RA computes the time law (H. Pham, Q.-C.
-    Pham, "A new approach to time-optimal path parameterization based on reachability analysis", IEEE T-RO 34(3), 2018):
-    d2s/dt2 is constant between grid points, so tensions jump there. The extra `timing` installs it.
+    limits of winches and of mobile carriers that move. The motors of winches with inertia pull their cables and
+    accelerate the winches. The tension limits, reduced by the task's margin, enter as the facets of the available
+    wrench set. TOPP-RA computes the time law (H. Pham, Q.-C. Pham, "A new approach to time-optimal path
+    parameterization based on reachability analysis", IEEE T-RO 34(3), 2018): d2s/dt2 is constant between grid points,
+    so tensions jump there. The extra `timing` installs it.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
@@ -119,14 +119,14 @@ def _limits(robot: Robot, task: Task, moving: list[int]) -> PathLimits:
 def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, intervals: int) -> Plan:
     """Solve and audit; after a violation again, on a finer grid or with more distance from the limits."""
     margin, weight = task.margin, parametrised.robot.force_scale
-    short, shrink, attempts, failures, weaker = list[_Stretches](), 0.0, 0, 0, np.zeros(parametrised.robot.m)
+    short, shrink, attempts, failures = list[_Stretches](), 0.0, 0, 0
     zones = [limit for limit in limits.speeds if isinstance(limit, ZoneSpeed)]
     corners = np.concatenate([[], *(parametrised.crossings(zone) for zone in zones)])
     while True:
         attempts += 1
         rises = np.concatenate([[], *(parametrised.rises(zone, RISE / intervals) for zone in zones)])
         grids = [_through(s, corners, np.append(rises, _rests(s))) for s in parametrised.pieces(intervals)]
-        pieces = [_piece(parametrised, limits, s, margin, _reserve(s, short, weight), shrink, weaker) for s in grids]
+        pieces = [_piece(parametrised, limits, s, margin, _reserve(s, short, weight), shrink) for s in grids]
         s = np.concatenate([pieces[0].s[:1], *(piece.s[1:] for piece in pieces)])
         law = FastestLaw(parametrised, limits, margin, s, np.full(len(s), np.nan))
         if failures == 0 and (proven := _proven(law, pieces)) is not None:
@@ -153,9 +153,6 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
             law = replace(law, at=float(law.path.law(audited.times[[audited.worst]])[0][0]))
             reason = f"no time law passed the audit in {ATTEMPTS} attempts"
             return Plan(scenario, MotionStatus.NOT_FOUND, None, audited, 0.0, 0.0, reason, law=law)
-        if any(each.limit == WinchForce.name for each in audited.excess):
-            limits, weaker = _for_winches(scenario.limits, audited, limits, weaker)
-            continue
         missing = _missing(law, audited)
         known = (each for each in audited.excess if each.limit in KNOWN_LIMITS)
         excess = max([0.0, *(each.value / each.bound - 1.0 for each in known)])
@@ -211,24 +208,6 @@ def _shown(task: Task, law: FastestLaw) -> Plan:
     return Plan(scenario, MotionStatus.INFEASIBLE, None, audited, 0.0, 0.0, law=law)
 
 
-def _for_winches(limits: Limits, audited: Audit, kept: PathLimits, weaker: np.ndarray) -> tuple[PathLimits, np.ndarray]:
-    """Return limits with which motors can pull and accelerate their winches, and how much smaller t_max is, (m,) [N].
-
-    `kept` and `weaker` are those so far. The force of each motor is divided between the tension and the inertia of its
-    winch, in the proportion in which a motion that exceeded it needs both.
-    """
-    robot, weaker, more = limits.robot, weaker.copy(), list[Limit]()
-    for limit, forces in zip(limits, audited.limited, strict=True):
-        for cable, force in zip(limit.cables, forces.T, strict=True) if isinstance(limit, WinchForce) else ():
-            winch, tension = robot.cables[cable].winch, audited.tensions[:, cable]
-            needed = float(np.abs(force - tension).max())  # to accelerate it
-            if winch and needed + tension.max() > limit.high:
-                share = needed / (needed + tension.max()) * limit.high
-                more.append(CableAcceleration(robot, share / winch.inertia, [cable]))
-                weaker[cable] = max(robot.t_max[cable] - (limit.high - share), weaker[cable])
-    return kept._replace(accelerations=Limits(robot, (*kept.accelerations.all, *more))), weaker
-
-
 class _Stretches(NamedTuple):
     """Stretches of s, from points of a grid to others, and the largest wrench that misses in each, (k,) [N]."""
 
@@ -239,7 +218,7 @@ class _Stretches(NamedTuple):
 
 def _missing(law: FastestLaw, audited: Audit) -> _Stretches:
     """Return where an audit found no tensions, and all of s for tensions beyond their limits, if they are too few."""
-    beyond = [abs(each.value - each.bound) for each in audited.excess if each.limit == TENSIONS]
+    beyond = [abs(each.value - each.bound) for each in audited.excess if each.limit in (TENSIONS, WinchForce.name)]
     rows = np.flatnonzero(audited.violation > audited.tolerance)
     at = law.path.law(audited.times)[0]
     first, last = np.searchsorted(law.s, [at[rows], at[np.minimum(rows + 1, len(at) - 1)]])
@@ -267,19 +246,33 @@ class _Piece(NamedTuple):
 
 
 def _piece(
-    parametrised: ParametrisedPath,
-    limits: PathLimits,
-    s: np.ndarray,
-    margin: float,
-    reserve: np.ndarray,
-    shrink: float,
-    weaker: np.ndarray,
+    parametrised: ParametrisedPath, limits: PathLimits, s: np.ndarray, margin: float, reserve: np.ndarray, shrink: float
 ) -> _Piece:
-    """Solve one piece."""
+    """Solve one piece.
+
+    A motor limits a tension by less than the cable does only while it accelerates its winch. Which motors do that is
+    not known beforehand: half-planes for those of a law without them are added until a law has no others.
+    """
     fastest, Rows = _toppra()
     inside = s if s[-1] == 1 else np.append(s[:-1], np.nextafter(s[-1], 0.0))
-    plane = phase_plane(parametrised, limits, inside, margin, reserve, shrink, weaker)
-    return _Piece(s, inside, plane, fastest(s - s[0], Rows(*plane.rows(parametrised.robot.force_scale), plane.x_max)))
+    plane, weight = phase_plane(parametrised, limits, inside, margin, reserve, shrink), parametrised.robot.force_scale
+    rows = plane.rows(weight)
+    law = fastest(s - s[0], Rows(*rows, plane.x_max))
+    known = list[np.ndarray]()
+    while law.x is not None and plane.winches is not None and not law.unlimited:
+        u = np.diff(law.x) / (2 * np.diff(s))
+        new = []
+        for each in (np.append(u, u[-1]), np.append(u[0], u)):  # those after and before each point
+            short = plane.winches.short(each, law.x)
+            which = np.hstack(short)
+            if not (~which.any(axis=1) | np.any([(which == other).all(axis=1) for other in known], axis=0)).all():
+                new.append(plane.winch_rows(short, weight))
+                known.append(which)
+        if not new or len(known) > MOST_SHORT:
+            break
+        rows = tuple(np.hstack(parts) for parts in zip(rows, *new, strict=True))
+        law = fastest(s - s[0], Rows(*rows, plane.x_max))
+    return _Piece(s, inside, plane, law)
 
 
 def _proven(law: FastestLaw, pieces: list[_Piece]) -> FastestLaw | None:

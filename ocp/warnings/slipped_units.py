@@ -137,9 +137,14 @@ def _unusual(robot: Robot, numbers: list[_Number]) -> Iterator[_Suspect]:
 
 
 def _frame(robot: Robot) -> tuple[np.ndarray, float]:
-    """Return centre (3,) and size [m] of the box about anchors in a frame, or else about anchors and platform."""
+    """Return centre (3,) and size [m] of the box about anchors in a frame and its floor, or about anchors and platform.
+
+    A floor is at height 0 if none is given: a crane's anchors may be much nearer to one another than to its load.
+    """
     points = robot.home_anchors
-    if not (np.ptp(points, axis=0).any() and all(robot.carriers[index].confined for index in robot.carrier_of_cable)):
+    if np.ptp(points, axis=0).any() and all(robot.carriers[index].confined for index in robot.carrier_of_cable):
+        points = np.vstack([points, [*points[0, :2], robot.floor or 0.0]])
+    else:
         points = np.vstack([points, robot.home[:3] + robot.attachments])
     return (points.min(axis=0) + points.max(axis=0)) / 2, float(np.linalg.norm(np.ptp(points, axis=0)))
 
