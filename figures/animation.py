@@ -118,7 +118,7 @@ class _Stage:
 
         scene, ax, seen = self._scene, self._ax, self._seen
         seen.fit(ax, AIR)
-        (path,) = ax.plot(*seen(scene.path).T, color="#bbbbbb", linewidth=1.2, label="path of the platform")
+        (path,) = ax.plot(*seen(scene.path).T, color="#bbbbbb", linewidth=1.2, label="platform's path, blue so far")
         named: list[Any] = [path]
         for index in range(len(scene.names)):
             (dotted,) = ax.plot(*seen(scene.carriers[:, index]).T, color="#999999", linewidth=0.8, linestyle=":")

@@ -6,6 +6,7 @@ import itertools
 import json
 from collections.abc import Iterable
 from functools import partial
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +23,8 @@ GREY = "#d4d4d4"
 DIFFERENCE = 0.01  # of all tensions' range: commands nearer to the real tensions are not drawn over them
 DECADES = 30.0  # largest error over the smallest of flights from which on the axis is logarithmic
 SCALES = ((1.0, 1.0, "m"), (1e-4, 1e-3, "mm"), (0.0, 1e-6, "µm"))  # from which lengths units are used, and their size
-EVENT_DASHES = ["-", (0, (4, 2)), (0, (1, 1.5)), (0, (6, 1.5, 1, 1.5))]
+EVENT_DASHES = ["-", (0, (4, 2)), (0, (1, 1.5)), (0, (6, 1.5, 1, 1.5)), (0, (6, 1.5, 1, 1.5, 1, 1.5)), (0, (1, 4))]
+EVENT_WIDTH = 50  # characters of a line in the legend
 THRUST = "thrust"  # an actuator of carriers that fly
 
 
@@ -102,8 +104,9 @@ def errors(flights: xr.Dataset) -> style.Figure:
     ax = style.axes(canvas, "share of the runs [%]", f"largest error [{unit}]")
     share = 100 * (np.arange(len(largest)) + 0.5) / len(largest)
     ax.plot(share, largest / scale, color="#999999", linewidth=0.8)
-    ax.plot(share[passed], largest[passed] / scale, "o", markersize=3, color=style.colour(0), label="passed")
-    ax.plot(share[~passed], largest[~passed] / scale, "x", markersize=5, color=style.colour(1), label="failed")
+    for index, (some, mark, label) in enumerate(((passed, "o", "passed"), (~passed, "x", "failed"))):
+        if some.any():
+            ax.plot(share[some], largest[some] / scale, mark, markersize=4, color=style.colour(index), label=label)
     if largest[0] * DECADES < largest[-1] and largest[0] > 0:
         ax.set_yscale("log")
     else:
@@ -119,9 +122,8 @@ def _mark_events(panels: list[style.Axes], trajectory: xr.Dataset) -> None:
     for event, dashes in zip(happened, itertools.cycle(EVENT_DASHES), strict=False):
         for ax in panels:
             ax.axvline(event["at_s"], color="#000000", linewidth=0.8, linestyle=dashes, zorder=1)
-        panels[0].plot(
-            [], [], color="#000000", linewidth=0.8, linestyle=dashes, label=f"{event['at_s']:.4g} s: {event['what']}"
-        )
+        label = fill(f"{event['at_s']:.4g} s: {event['what']}", EVENT_WIDTH)
+        panels[0].plot([], [], color="#000000", linewidth=0.8, linestyle=dashes, label=label)
 
 
 def _draw_error(ax: style.Axes, trajectory: xr.Dataset) -> None:

@@ -16,13 +16,16 @@ REACH = {"facecolor": "none", "edgecolor": "#666666", "linestyle": "--", "linewi
 
 
 def views(scene: Scene) -> style.Figure:
-    """Draw a scene of a few instants, from start to end, in two views of equal scale."""
+    """Draw a scene of a few instants, from start to end in two views of equal scale, or one if it is flat."""
     robot = scene.points
     near = NEAR * np.ptp(robot, axis=0).max()  # only this part of walls much larger than the robot is drawn
     lines = [line for outline_of in scene.obstacles for line in outline_of]
     outlines = [np.clip(line, robot.min(axis=0) - near, robot.max(axis=0) + near) for line in lines]
-    canvas, panels = views_of(np.vstack([robot, *outlines]), (ABOVE, FRONT), below=0.7)
-    for ax, view in zip(panels, (ABOVE, FRONT), strict=True):
+    points = np.vstack([robot, *outlines])
+    thick = np.ptp(points, axis=0) > 1e-6 * np.ptp(points, axis=0).max()
+    seen = [view for view in (ABOVE, FRONT) if thick[view.across] and thick[view.up]] or [ABOVE, FRONT]
+    canvas, panels = views_of(points, seen, below=0.7)
+    for ax, view in zip(panels, seen, strict=True):
         _view(ax, scene, [view.across, view.up])
     return style.legend_below(canvas, panels[0])
 

@@ -62,12 +62,13 @@ class Charts:
         shown = [limit for limit in limits if low < limit < high]
         lines = [*((np.full(len(self._curves.times), limit), "limit", constant) for limit in shown), *lines]
         outside = low + BELOW * (high - low)
-        marks = self._curves.infeasible.astype(float)
-        columns = [marks, *(_drawn(values, outside) for values, _, _ in lines)]
         hidden = {"points": {"show": False}}
+        marks = [self._curves.infeasible.astype(float)] if self._curves.infeasible.any() else []
+        marked = {"label": "infeasible", "scale": "mark", "fill": MARK, "width": 0, **hidden}
+        columns = [*marks, *(_drawn(values, outside) for values, _, _ in lines)]
         series = (
             {"label": "time [s]"},
-            {"label": "no tensions", "scale": "mark", "fill": MARK, "width": 0, **hidden},
+            *([marked] * len(marks)),
             *({"label": label, "scale": "y", **look, **hidden} for _, label, look in lines),
             {"label": "now", "scale": "mark", "stroke": NOW, "width": 1.5, **hidden},
         )

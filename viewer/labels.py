@@ -129,10 +129,13 @@ def shortfall(instant: Snapshot) -> str:
 
 
 def legend(subject: Subject, cell: float) -> str:
-    """Return the meaning of colours and marks as HTML; `cell` is the edge of the grid's cells [m]."""
-    robot = subject.robot
+    """Return the meaning of colours and marks that can occur, as HTML; `cell` is the edge of the grid's cells [m]."""
+    robot, motions = subject.robot, [it for it in (subject.replay, subject.other) if it]
+    missing = not motions or any(np.isnan(motion.tensions).any() for motion in motions)
     bar = _gradient(_limit("t_min", robot.t_min), _limit("t_max", robot.t_max))
-    marks = [("no tensions", NO_TENSION), ("platform", style.colour(4))]
+    marks = [("platform", style.colour(4))]
+    marks += [("no feasible tensions", NO_TENSION)] if missing else []
+    marks += [("cable that has been cut", NO_TENSION)] if any("cut" in it.dataset for it in motions) else []
     marks += [("post below an anchor", PART)] if not all(carrier.moves for carrier in robot.carriers) else []
     marks += [("pulley (its sheave)", BLACK)] if robot.pulley_radii.any() else []
     marks += [("quadrotor (arms and rotors)", BLACK)] if any(c.drawing.rotors for c in robot.carriers) else []
@@ -141,7 +144,7 @@ def legend(subject: Subject, cell: float) -> str:
     marks += [("platform, cables and path of the other motion", OTHER)] if subject.other else []
     marks += [("keep out", style.colour(5))] if subject.replay and subject.replay.obstacles else []
     marks += [("reach of a carrier", style.colour(3))] if any(c.drawing.boxes for c in robot.carriers) else []
-    marks += [("missing wrench: the direction of its force", style.colour(1))]
+    marks += [("missing wrench: the direction of its force", style.colour(1))] if missing else []
     marks += subject.cloud.legend if subject.cloud else []
     rows = [f'<div><span style="color:{hue}">&#9632;</span> {escape(name)}</div>' for name, hue in marks]
     summary = f'<div style="color:{MUTED}">{escape(subject.cloud.summary)}</div>' if subject.cloud else ""

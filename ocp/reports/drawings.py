@@ -27,7 +27,7 @@ def drawings(plan: PlanData, trajectory: xr.Dataset) -> dict[str, Drawing]:
     """Return the figures by the names of their files, without suffix; a figure without content is left out."""
     times = np.linspace(0.0, plan.scenario.duration, INSTANTS)
     drawn = {
-        "views": Drawing("From above and from the side", views(scene(plan.scenario.robot, trajectory, times))),
+        "views": Drawing("Path, with the robot at both ends", views(scene(plan.scenario.robot, trajectory, times))),
         "tensions": Drawing("Tensions against their limits", plan_figures.tensions(trajectory)),
     }
     if plan.law is not None and plan.law.exists:

@@ -19,6 +19,7 @@ from .relaxations import planned, rounded
 from .search import Search
 
 LEAST = 0.05  # of a path: with less, other changes are better advice
+MOST_NAMED = 5  # points of a smaller path that its advice gives
 PLACES = 31  # of a path, at which a shifted one is compared
 YAWS = np.deg2rad(np.arange(-180, 180, 5))  # that are tried
 POINT, POINTS, PATHS = ("start", "end", "pose", "centre"), ("points", "poses"), ("path", "along")
@@ -72,8 +73,14 @@ def near_home(scenario: Scenario) -> Change | None:
         return None
 
     def about_home(share: float) -> Variation:
-        place = quantity_row(home[:3] + 0.0)
-        return along(scenario, shrunk(path, home, share)), 100 * share, f"of it, shrunk towards home, ({place}) m"
+        smaller = shrunk(path, home, share)
+        points = {name: getattr(smaller, name) for name in POINT if hasattr(smaller, name)}
+        points |= {f"points[{i}]": point for i, point in enumerate(getattr(smaller, "points", ()))}
+        points = points if len(points) <= MOST_NAMED else {"home": home.tolist()}
+        shown = {name: [a + 0.0 for a in point[: 6 if any(point[3:]) else 3]] for name, point in points.items()}
+        given = [f"{name} [{quantity_row(point, digits=6)}]" for name, point in shown.items()]  # to be copied
+        given += [f"radius {quantity(smaller.radius, 'm', 6)}"] if isinstance(smaller, CirclePath) else []
+        return along(scenario, smaller), 100 * share, f"of it, shrunk towards home: {', '.join(given)}"
 
     return Change("size of the path", "%", about_home, least=LEAST)
 
