@@ -5,7 +5,6 @@ from ..logs.reading import read_measurements
 from .calibration import Calibration
 from .correction import corrected
 from .cross_validation import Compared, HeldOut
-from .design import next_poses
 from .outliers import Outlier, Slip
 from .plausibility import Mistake, mistake
 from .result import Parameter
@@ -24,6 +23,5 @@ __all__ = [
     "calibrate",
     "corrected",
     "mistake",
-    "next_poses",
     "read_measurements",
 ]
