@@ -72,6 +72,14 @@ def test_the_default_region_is_above_the_floor_and_in_the_room():
     np.testing.assert_allclose(high[[0, 2]] + highest[[0, 2]], [2, 3.5], atol=0.1)
 
 
+def test_the_default_region_of_a_crane_goes_down_to_its_floor():
+    """Its home and anchors alone are a box that ends 4 m above the floor."""
+    ends = [([x, 0, 12], [x, 0, 0.5]) for x in (-0.5, 0.5)]
+    robot = framed(ends, {"mass": 500, "dof": ["z"], "home": [0, 0, 5, 0, 0, 0]}, t_max=6000)
+    height = sample(robot.model_copy(update={"floor": 1.0}), StaticEquilibrium(), samples=500)["position"].values[:, 2]
+    np.testing.assert_allclose([height.min(), height.max()], [1, 11.5], atol=0.3)
+
+
 def test_the_default_region_of_a_long_robot_is_no_wider_than_its_platform_can_be():
     """Farther beyond the anchors than an attachment is from the platform's origin, all cables pull back."""
     ends = [([12 * x, y, 3], [-0.2 * x, 0.3 * y, 0.4 * z]) for x in (-1, 1) for y in (-1, 1) for z in (0, 1)]

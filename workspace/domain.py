@@ -163,7 +163,7 @@ def _carrier_boxes(robot: Robot, region: Region) -> dict[str, Box]:
 
 
 def _default_box(robot: Robot, carriers: dict[str, Box]) -> tuple[np.ndarray, np.ndarray]:
-    """Return a box about home and anchors, (3,) and (3,) [m], where the platform is above the floor and in the room."""
+    """Return a box about home and anchors, (3,) and (3,) [m], down to the floor and inside the room of the robot."""
     low, high = surrounding_box(robot, carriers)
     lowest, highest = room(robot)
     moving = robot.dof_mask[:3] > 0

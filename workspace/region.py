@@ -28,7 +28,7 @@ class Region(Part):
     """
 
     position: Box | None = optional(
-        "box of positions of the platform frame in {G} [m]; default: a box about home and anchors, above the floor "
+        "box of positions of the platform frame in {G} [m]; default: a box about home and anchors, down to the floor "
         "and inside the workspace_box of the robot file"
     )
     attitude: Vector3 | AngleBox | None = optional(
@@ -52,11 +52,14 @@ class Region(Part):
 
 
 def surrounding_box(robot: Robot, carriers: dict[str, Box]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners of a box about home and anchors, (3,) and (3,) [m]; locked coordinates stay at home.
+    """Return the corners of a box about home, anchors and the floor below, (3,) and (3,) [m].
 
+    Locked coordinates stay at home. A platform that hangs from anchors near one another can be far below them.
     Carriers are in the boxes of `carriers`, by name, or else at home.
     """
     corners = [robot.home_anchors, robot.home[None, :3]]
+    if robot.floor is not None:
+        corners.append(np.array([[*robot.home[:2], robot.floor]]))
     for index, carrier in enumerate(robot.carriers):
         if carrier.name in carriers:
             own = robot.home_anchors[robot.carrier_of_cable == index] - carrier.home[:3]

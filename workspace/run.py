@@ -58,8 +58,8 @@ def sample(
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
         condition: A `Condition`, or a mapping with its `kind` and keys.
-        region: A `Region`, or a mapping of its keys; default: a box about home and anchors, above the floor and inside
-            the `workspace_box` of the robot file, and everything else at home.
+        region: A `Region`, or a mapping of its keys; default: a box about home and anchors, down to the floor and
+            inside the `workspace_box` of the robot file, and everything else at home.
         samples: Number of samples; a grid has at most this many.
         method: random; sobol (low discrepancy); or grid.
         seed: Seed of the random streams, and of the scrambling of sobol.
