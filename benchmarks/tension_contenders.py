@@ -32,7 +32,7 @@ BATCH = 10_000  # Problems of a batch, at least: the task's, over and over.
 _EQUALITY = 5  # DAQP's constraint type: always active
 
 # Methods that end at the least norm, as the QP does; the others are right to answer something else.
-_LEAST_NORM = {"active-set", "qp", "min-norm"}
+_LEAST_NORM = {"active-set", "qp", "min-norm", "dykstra"}
 
 _QPSOLVERS: dict[str, dict[str, Any]] = {
     "clarabel": {"tol_gap_abs": EPS, "tol_gap_rel": 0.0, "tol_feas": EPS},

@@ -35,7 +35,8 @@ def design(
 ) -> None:
     """Find the best anchors, attachments and tension limits, and report what limits them.
 
-    The best layout has the largest capacity margin or, if the requirements say so, the weakest winches.
+    The best layout has the largest capacity margin, unless the requirements name another objective: the weakest
+    winches, the lowest cost, the largest volume or the highest natural frequency.
 
     The exit code is 1 if no layout that meets the requirements was found, or if none exists, which is then proven.
     Ctrl-C ends the search with the best layout so far.

@@ -35,8 +35,8 @@ from .watching import counting, watching
     --out: NetCDF (.nc) or MCAP (.mcap) file to write; default: ROBOT-TASK.nc in this folder, from the `name` keys of
         both files, and ROBOT-TASK-infeasible.nc or ROBOT-TASK-not-found.nc if the plan is not feasible. An existing
         file is overwritten.
-    --figures: Folder for figures: views.png, tensions.png and, if applicable, path.png, base.png (carriers) and
-        limits.png.
+    --figures: Folder for figures: views.png, tensions.png and, if applicable, path.png, base.png (carriers), limits.png
+        and convergence.png.
     --animate: File for a film of the motion: .gif, or .mp4 with ffmpeg.
     --robust SHARE: The tension limits must hold for this fraction, such as 0.95, of all robots within the
         uncertainty of the robot file; default: the task's value.

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 # Those of `solvers.methods`, which takes longer to load than help may.
 METHODS = (
-    "active-set, daqp, qp, min-norm, closed-form, improved-closed-form, centroid, 1-norm, 2-norm, least-sum, "
-    "largest-margin, min-max, log-barrier, soft-wrench"
+    "active-set, daqp, qp, min-norm, closed-form, improved-closed-form, centroid, 1-norm, 2-norm, dykstra, least-sum, "
+    "largest-margin, min-max, log-barrier, analytic-centre, p-norm, soft-wrench"
 )
 
 

@@ -48,8 +48,9 @@ METRICS = (
     --lengths: For robots with three cables, instead of --box: range 'min max' of their lengths [m]; the positions
         follow from them.
     --samples: Number of samples, such as 60000 or 1e8.
-    --method: Sampling method: random, sobol or grid.
+    --method: Sampling method: random, sobol, grid or adaptive.
     --seed: Seed of the random numbers.
+    --size: With the method adaptive: smallest edge of a cell [m]. Default: as small as the number of samples permits.
 {long_run()}
     --keep: Samples to keep in the file, at most a million: accepted, all or none.
     --out: NetCDF file to write (an existing one is overwritten), or new .zarr folder. Default: ROBOT-workspace.nc in
@@ -70,6 +71,7 @@ def workspace(
     samples: float = 60_000,
     method: str = "random",
     seed: int = 0,
+    size: float | None = None,
     workers: int = 1,
     scheduler: str | None = None,
     checkpoint: Path | None = None,
@@ -103,7 +105,7 @@ def workspace(
     surface = None if mesh is None else _boundary(loaded, required, region)
     with counting(f"sampling {loaded.name}", "accepted", quiet=as_json) as show:
         where = Execution(workers, scheduler, stored, resume is not None, resumable(show, stored, "samples"))
-        kept = {"keep": keep, "metrics": metric or ()}
+        kept = {"size": size, "keep": keep, "metrics": metric or ()}
         result = sample(loaded, required, region, int(samples), method, seed, execution=where, **kept)
     add_to_message("")
     written = [save(result, target)]
@@ -116,7 +118,7 @@ def workspace(
     if as_json:
         print_json({**summary, "reason": reason, "file": target, "figure": figure, "mesh": mesh})
     else:
-        _show(result, summary, reason)
+        _show(result, summary, size, reason)
         print_written(written)
     if not summary["accepted"]:
         raise typer.Exit(1)
@@ -239,7 +241,7 @@ def _range(values: xr.DataArray) -> dict[str, Any]:
     return {"min": low, "median": middle, "max": high, "unit": values.attrs["units"]}
 
 
-def _show(result: xr.Dataset, summary: dict[str, Any], reason: str | None) -> None:
+def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None, reason: str | None) -> None:
     import math
 
     from ..base.text import quantity, quantity_range
@@ -255,6 +257,11 @@ def _show(result: xr.Dataset, summary: dict[str, Any], reason: str | None) -> No
     about = "" if math.isnan(low) else f"{between} ({result['volume_interval'].long_name})"
     size_of = {"m^2": "area", "m": "length"}.get(unit, "volume")
     typer.echo(f"  {size_of} {quantity(summary['volume'], unit, digits=6)}{about}")
+    if "cell_edges" in result:
+        longest = float(result["cell_edges"].max())
+        larger = size is not None and longest > size * (1 + 1e-9)
+        more = f", not {size:g} m, which takes more samples" if larger else ""
+        typer.echo(f"  edges of the smallest cells up to {quantity(longest, 'm', digits=3)}{more}")
     if accepted:
         for name, ends in summary["bounds"].items():
             typer.echo(f"  {name} {quantity_range(ends, 'm')}")

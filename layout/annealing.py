@@ -36,7 +36,7 @@ def anneal(evaluation: Evaluation, goal: Goal, moves: Moves, rng: np.random.Gene
 
     def score(y: np.ndarray, least: float) -> float:
         found = evaluation.margins(y)
-        value = goal.value(y, float(found.min()))
+        value = goal.value(y, evaluation.outcome_besides(y, goal, float(found.min())))
         value += _NEGATIVE * float(np.minimum(found, 0.0).mean())
         if value > least:  # else it is refused without the distances
             value -= _MISSING_COSTS * force / evaluation.room.size * evaluation.missing(y)

@@ -1,4 +1,4 @@
-"""`Evaluation`: margins and distances of many layouts of a robot at given poses, with derivatives.
+"""`Evaluation`: margins, distances and frequencies of many layouts of a robot at given poses, with derivatives.
 
 The characteristic length stays that of the robot's file, whatever the attachments become: a design would otherwise
 change the unit in which it is measured.
@@ -14,17 +14,26 @@ import numpy as np
 from .. import core
 from ..models import Robot
 from ..models.dynamics import dynamics_of
+from ..models.mechanics import Mechanics
 from ..models.points import rotations
 from ..models.record import record_of
+from ..ocp.tasks.lay_out import lay_out
+from ..ocp.tasks.task import Task
+from ..solvers import solve_batch
 from ..solvers.margins import Reserves, all_reserves, margins, reserves
+from ..statics.stiffness import frequencies_of
 from ..workspace.conditions.interference import nearest_points
-from .goal import Outcome
+from .goal import Goal, Outcome
 from .requirements import Requirement
 from .room import Region, Room
 from .variables import Variables, parts
 
 NO_BOUNDS = Room()
 ByVariables = Callable[[np.ndarray, np.ndarray], np.ndarray]  # (poses, columns), (k,) each -> (k, p)
+INSTANTS, FEW_INSTANTS = 41, 9  # of each task, and for annealing
+MOST_SLOW = 40  # lowest frequencies, which a linear program has
+MOST_LONG = 4  # longest lengths of each cable, which a linear program has
+_STEP = 1e-6  # of the range of a variable, for differences of frequencies
 _STEEP = 1e7  # times the length: slopes of a facet whose columns nearly depend on each other say nothing
 
 
@@ -62,6 +71,22 @@ def rows_of(robot: Robot, requirements: tuple[Requirement, ...], poses: list[np.
     return Rows(np.concatenate(poses), pose_of, wrenches, accelerations)
 
 
+def with_tasks(rows: Rows, robot: Robot, tasks: tuple[Task, ...], count: int = INSTANTS) -> Rows:
+    """Return the rows, followed by those of each task that fixes its motion and leaves the carriers at home.
+
+    The wrenches of other tasks depend on the planner's choices, so these tasks are only planned at the end.
+    """
+    for task in tasks:
+        scenario = lay_out(robot, task)
+        if not scenario.is_fixed or scenario.carrier_paths:
+            continue
+        times = np.linspace(0.0, scenario.duration, count)
+        motion, carriers = scenario.motion(times, None)
+        wrenches = scenario.required_wrench(times, motion, carriers, scenario.wind)
+        rows = rows.joined(Rows(motion.pose, np.arange(count), wrenches, motion.acceleration))
+    return rows
+
+
 class Slopes(NamedTuple):
     """Values of some rows and their derivatives by the variables."""
 
@@ -81,6 +106,7 @@ class Evaluation:
         robot = variables.robot
         self.variables, self.rows, self.room = variables, rows, room
         self._record = record_of(robot).copy()
+        self._mechanics = Mechanics(robot, self._record)
         self._m, self._home = robot.m, np.ascontiguousarray(robot.carrier_home)
         self._kept = np.flatnonzero(robot.dof_mask)
         self._scale = robot.wrench_scale[self._kept]
@@ -140,16 +166,49 @@ class Evaluation:
         core.lines(self._record, self._poses, self._home, lengths, None, None, None, None)
         return lengths
 
-    def outcome(self, y: np.ndarray) -> Outcome:
+    def frequencies(self, y: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+        """Return up to two lowest natural frequencies of some rows, default: of all, (k, 2) [Hz].
+
+        They are those with the tensions of least norm that balance each wrench, and 0 where there are none.
+        """
+        A, w, t_min, t_max = self._problem(y, rows)
+        poses = self._poses[self.rows.pose_of if rows is None else self.rows.pose_of[rows]]
+        solved = solve_batch(A, w, t_min, t_max, threads=1)
+        tensions = np.where(solved.feasible[:, None], solved.tensions, 0.0)
+        K = self._mechanics.stiffness(poses, tensions, None, True)
+        return np.where(solved.feasible[:, None], frequencies_of(self.variables.robot, K, poses)[:, :2], 0.0)
+
+    def outcome(self, y: np.ndarray, goal: Goal) -> Outcome:
         """Return what counts of a layout."""
-        return Outcome(float(self.margins(y).min()), self.missing(y))
+        return self.outcome_besides(y, goal, float(self.margins(y).min()))._replace(missing=self.missing(y))
+
+    def outcome_besides(self, y: np.ndarray, goal: Goal, margin: float) -> Outcome:
+        """Return what counts besides a known margin, without the room; no frequency where no tensions exist."""
+        frequency = float(self.frequencies(y).min()) if goal.per_hertz and margin > 0.0 else 0.0
+        cable = float(self.lengths(y).max(axis=0).sum()) if goal.per_metre else 0.0
+        return Outcome(margin, 0.0, frequency, cable)
+
+    def frequency_slopes(self, y: np.ndarray) -> Slopes:
+        """Return the lowest frequencies of some rows with their derivatives, by differences."""
+        rows = np.argsort(self.frequencies(y)[:, 0])[:MOST_SLOW]
+        value = self.frequencies(y, rows)
+        steps = _STEP * np.maximum(self.variables.high - self.variables.low, _STEP)
+        changes = [self.frequencies(y + step, rows) - value for step in np.diag(steps)]
+        by_variables = np.array(changes).reshape(y.size, value.size).T / steps
+        usable = self.usable(by_variables)
+        return Slopes(value.ravel()[usable], by_variables[usable])
 
     def spaces(self, y: np.ndarray) -> np.ndarray:
         """Return by how much the bounds of the room are kept at each pose, (N, k) [m]; negative where they are not.
 
-        Of regions a value that is not negative may be too small.
+        Frequencies are relative to their bound. Of regions a value that is not negative may be too small.
         """
-        return np.hstack([np.zeros((len(self._poses), 0)), *(values for values, _ in self._bounds(y, exact=False))])
+        found = [np.zeros((len(self._poses), 0)), *(values for values, _ in self._bounds(y, exact=False))]
+        if self.room.frequency > 0.0:
+            least = np.full(len(self._poses), np.inf)
+            np.minimum.at(least, self.rows.pose_of, self.frequencies(y)[:, 0])
+            found.append(least[:, None] / self.room.frequency - 1.0)
+        return np.hstack(found)
 
     def missing(self, y: np.ndarray) -> float:
         """Return how far the worst bound of the room is missed at some pose [m]."""
@@ -162,7 +221,17 @@ class Evaluation:
             chosen = np.argsort(values, axis=None)[:most]
             chosen = chosen[values.ravel()[chosen] < below]
             found.append(Slopes(values.ravel()[chosen], slopes(*np.unravel_index(chosen, values.shape))))
+        if self.room.frequency > 0.0:
+            slow = self.frequency_slopes(y)
+            found.append(Slopes(slow.value / self.room.frequency - 1.0, slow.by_variables / self.room.frequency))
         return Slopes(*(np.concatenate(part) for part in zip(*found, strict=True)))
+
+    def longest_slopes(self, y: np.ndarray) -> tuple[Slopes, np.ndarray]:
+        """Return the largest lengths of each cable with their derivatives, and the cable of each, (k,)."""
+        lengths = self.lengths(y)
+        poses = np.argsort(-lengths, axis=0)[:MOST_LONG]
+        cables = np.broadcast_to(np.arange(self._m), poses.shape).ravel()
+        return Slopes(lengths[poses.ravel(), cables], self._by_length(poses.ravel(), cables)), cables
 
     def _bounds(self, y: np.ndarray, exact: bool) -> Iterator[tuple[np.ndarray, ByVariables]]:
         """Yield by how much each bound of distances, lengths and heights is kept, (N, k) [m], and its derivatives.

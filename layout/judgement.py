@@ -9,6 +9,7 @@ from ..models.dynamics import dynamics_of
 from ..models.points import in_frame
 from ..solvers import TensionProblem, capacity_margin, solve_batch
 from ..solvers.margins import margins
+from ..statics.stiffness import natural_frequencies
 from ..workspace.conditions.interference import cable_distances, outside
 from ..workspace.feasibility import NEAREST
 from .evaluation import Rows
@@ -18,24 +19,27 @@ _JUDGED = 100  # worst rows, by `capacity_margin`
 
 
 class Judgement(NamedTuple):
-    """The distances and lengths of a robot at some rows."""
+    """The distances, lengths and frequency of a robot at some rows."""
 
     clearance: float  # smallest distance between two cables without a common end [m]
     closest: tuple[tuple[int, int], np.ndarray] | None  # these cables, counted from 0, and the pose (6,)
     lengths: tuple[float, float]  # shortest and longest length of a cable [m]
     distances: tuple[tuple[str, float], ...]  # name of each region, and the distance of cables from it [m]
     height: float  # of the lowest end of a cable [m]
+    cable: float  # sum of the longest lengths of all cables [m]
+    frequency: float | None  # lowest natural frequency [Hz]; None if it does not count
 
     def keeps(self, room: Room) -> bool:
         """Return whether the robot keeps the bounds of a room."""
         pairs = zip(self.distances, room.regions, strict=True)
         regions = all(distance > 0.0 and distance >= region.least for (_, distance), region in pairs)
         lengths = room.shortest <= self.lengths[0] and self.lengths[1] <= room.longest
-        return self.clearance >= room.clearance and lengths and regions and self.height >= room.lowest
+        frequency = self.frequency is None or self.frequency >= room.frequency
+        return self.clearance >= room.clearance and lengths and regions and self.height >= room.lowest and frequency
 
 
-def judge(robot: Robot, rows: Rows, room: Room) -> Judgement:
-    """Judge a robot at rows."""
+def judge(robot: Robot, rows: Rows, room: Room, frequency: bool) -> Judgement:
+    """Judge a robot at rows; its frequency too if it counts."""
     starts, ends = dynamics_of(robot).points(rows.poses)
     lengths = dynamics_of(robot).cable_lengths(rows.poses)
     distances = []
@@ -45,6 +49,12 @@ def judge(robot: Robot, rows: Rows, room: Room) -> Judgement:
             p, p_end = (in_frame(rows.poses[:, None], points) for points in (ends, starts))
         distance = float(outside(region.shape, p.reshape(-1, 3), p_end.reshape(-1, 3)).min())
         distances.append((region.name, distance))
+    lowest = None
+    if frequency:  # with the tensions of least norm; 0 where no tensions exist
+        A, w = _problems(robot, robot.length, rows)
+        solved = solve_batch(A, w, robot.t_min, robot.t_max)
+        poses = rows.poses[rows.pose_of]
+        lowest = float(natural_frequencies(robot, poses, solved.tensions)[:, 0].min()) if solved.feasible.all() else 0.0
     between = {pair: (float(d.min()), int(d.argmin())) for pair, d in cable_distances(robot, starts, ends).items()}
     pair = min(between, key=between.__getitem__, default=None)
     return Judgement(
@@ -53,6 +63,8 @@ def judge(robot: Robot, rows: Rows, room: Room) -> Judgement:
         (float(lengths.min()), float(lengths.max())),
         tuple(distances),
         float(min(starts[..., 2].min(), ends[..., 2].min())),
+        float(lengths.max(axis=0).sum()),
+        lowest,
     )
 
 

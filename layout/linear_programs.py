@@ -11,7 +11,7 @@ from .goal import Goal
 
 MOST_RESERVES, MOST_DISTANCES = 150, 100  # smallest ones, which a linear program has
 _PER_SIZE = 200.0  # cost, in force scales, of missing a bound by the size of the robot
-_LARGEST = 1e7  # of the objective, in force scales
+_LARGEST = 1e7  # of the objective [N]
 _FOUND, LITTLE = 1e-5, 0.01  # the search ends when the gain is below _FOUND * max(LITTLE * force scale, margin)
 PROGRAMS = 60  # from one start, at most
 
@@ -42,27 +42,41 @@ class _Program:
         self.found, slopes = evaluation.reserves(y, rows, normals)
         good = evaluation.usable(slopes)
         self.rows, self.good = rows[good], good
-        # Variables: steps as shares of the ranges, the margin in force scales, and what the room misses in sizes.
-        force, size = variables.robot.force_scale, evaluation.room.size
+        # Variables: steps as shares of the ranges, the margin, what the room misses, the lowest frequency, and the
+        # longest length of each cable.
+        lengths = variables.robot.m if goal.per_metre else 0
+        one = np.eye(3 + lengths)
+        parts = [(Slopes(every.ravel()[chosen][good], slopes[good]), one[0])]
         near = 4.0 * delta * float(self.scale.max(initial=0.0))
-        spaces = evaluation.space_slopes(y, MOST_DISTANCES, near)
-        parts = [(Slopes(every.ravel()[chosen][good], slopes[good]), force, [1.0, 0.0]), (spaces, size, [0.0, -1.0])]
+        parts.append((evaluation.space_slopes(y, MOST_DISTANCES, near), -one[1]))
+        if goal.per_hertz:
+            parts.append((evaluation.frequency_slopes(y), one[2]))
+        if lengths:
+            longest, cables = evaluation.longest_slopes(y)
+            parts.append((Slopes(-longest.value, -longest.by_variables), -one[3 + cables]))
         A = np.vstack(
             [
-                np.hstack([-part.by_variables * self.scale / unit, np.broadcast_to(column, (len(part.value), 2))])
-                for part, unit, column in parts
+                np.hstack([-part.by_variables * self.scale, np.broadcast_to(column, (len(part.value), len(one)))])
+                for part, column in parts
             ]
         )
-        b = np.concatenate([part.value / unit for part, unit, _ in parts])
-        cost = np.r_[goal.price * self.scale / force, -1.0, _PER_SIZE]
+        b = np.concatenate([part.value for part, _ in parts])
+        missing = _price_of_missing(evaluation)
+        cost = np.r_[goal.price * self.scale, -1.0, missing, -goal.per_hertz, np.full(lengths, goal.per_metre)]
         below, above = (variables.low - y) / self.scale, (variables.high - y) / self.scale
         self.low, self.high = np.maximum(below, -delta), np.minimum(above, delta)
         self.at_low, self.at_high = below >= -delta, above <= delta
-        largest = min(goal.enough / force, _LARGEST)
-        bounds = np.vstack([np.c_[self.low, self.high], [[-_LARGEST, largest], [0.0, _LARGEST]]])
+        most = _LARGEST if goal.per_hertz else 0.0
+        bounds = np.vstack(
+            [
+                np.c_[self.low, self.high],
+                [[-_LARGEST, min(goal.enough, _LARGEST)], [0.0, _LARGEST], [-most, most]],
+                np.tile([0.0, _LARGEST], (lengths, 1)),
+            ]
+        )
         options = {"presolve": False}  # of which such small dense programs have nothing
         self.solution = linprog(cost, A_ub=A, b_ub=b, bounds=bounds, method="highs", options=options)
-        self.value = -force * self.solution.fun - float(goal.price @ y) if self.solution.success else -np.inf
+        self.value = -self.solution.fun - float(goal.price @ y) if self.solution.success else -np.inf
 
 
 def maximise(
@@ -103,7 +117,8 @@ def maximise(
 def merit(evaluation: Evaluation, goal: Goal, y: np.ndarray) -> tuple[float, np.ndarray]:
     """Return what `maximise` improves, the goal less the price of what the room misses [N], and all reserves."""
     every = evaluation.all_reserves(y)
-    return goal.value(y, float(every.min())) - _price_of_missing(evaluation) * evaluation.missing(y), every
+    outcome = evaluation.outcome_besides(y, goal, float(every.min()))
+    return goal.value(y, outcome) - _price_of_missing(evaluation) * evaluation.missing(y), every
 
 
 def _price_of_missing(evaluation: Evaluation) -> float:
@@ -120,8 +135,7 @@ def multipliers(evaluation: Evaluation, goal: Goal, y: np.ndarray, delta: float 
         none, nowhere = np.zeros((0, 0)), np.zeros(p)
         return Multipliers(np.zeros(0, dtype=int), np.zeros(0), none, none, nowhere, nowhere, np.inf)
     weights = np.abs(solution.ineqlin.marginals[: program.rows.size])
-    force = evaluation.variables.robot.force_scale
-    upper, lower = (force * np.abs(side.marginals[:p]) / program.scale for side in (solution.upper, solution.lower))
+    upper, lower = (np.abs(side.marginals[:p]) / program.scale for side in (solution.upper, solution.lower))
     keep = weights > 1e-9
     return Multipliers(
         program.rows[keep],
@@ -130,5 +144,5 @@ def multipliers(evaluation: Evaluation, goal: Goal, y: np.ndarray, delta: float 
         program.found.direction[program.good][keep],
         np.where(program.at_high, upper, 0.0),
         np.where(program.at_low, lower, 0.0),
-        program.value - goal.value(y, float(every.min())),
+        program.value - goal.value(y, evaluation.outcome_besides(y, goal, float(every.min()))),
     )

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..models import Robot
 from .evaluation import Evaluation
-from .goal import PRICE, Goal
+from .goal import Goal
 from .linear_programs import LITTLE, multipliers
 from .variables import Variables
 
@@ -30,7 +30,7 @@ class Binding(NamedTuple):
 
 
 class Advice(NamedTuple):
-    """The gain per unit of a change, to first order: of margin, or by which the mean t_max falls."""
+    """The gain per unit of a change, to first order: of margin or frequency, or by which mean t_max or cost falls."""
 
     change: str
     gain: float
@@ -71,7 +71,7 @@ def reasons(evaluation: Evaluation, goal: Goal, y: np.ndarray) -> Reasons:
     margin = float(evaluation.margins(y).min())
     span = variables.high - variables.low
     bound = (span > 0.0) & (np.minimum(y - variables.low, variables.high - y) <= 1e-9 * np.maximum(span, 1.0))
-    # Otherwise the margin is as required, and the program improves t_max.
+    # Otherwise the margin is as required, and the program improves t_max, cost or frequency.
     of_margin = bool(np.isinf(goal.wanted) or total > 1.0 - _SMALL)
     scale = LITTLE * robot.force_scale
     if of_margin:
@@ -79,11 +79,13 @@ def reasons(evaluation: Evaluation, goal: Goal, y: np.ndarray) -> Reasons:
     advice = _advice(robot, found.weights, found.pull, direction, rows.accelerations[found.rows])
     if not of_margin:
         advice[:1] = [Advice("margin lower by 1 N", total, "N/N")]
+    if goal.per_hertz or evaluation.room.frequency:
+        del advice[1:]  # t_min and mass change the frequencies, too
     advice += _of_boxes(variables, found.by_high, found.by_low)
-    unit = 1.0 if of_margin else PRICE
+    unit, name = (1.0, "N/") if of_margin else (goal.unit, f"{goal.unit_text}/")
     return Reasons(
         tuple(binding),
-        tuple(one._replace(gain=one.gain / unit) for one in advice),
+        tuple(Advice(one.change, one.gain / unit, one.unit.replace("N/", name, 1)) for one in advice),
         bool(found.left <= _CONVERGED * scale),
         int(bound.sum()),
         of_margin,

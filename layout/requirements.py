@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ..base.inputs import file_path
+from ..models import Robot
 from ..models.parsing import read_yaml, validate
 from ..models.part import (
     Box,
@@ -23,6 +24,7 @@ from ..models.part import (
     Whole,
     optional,
 )
+from ..ocp.tasks.task import Task
 from ..ocp.tasks.task_limits import AnyKeepOut
 
 Wrench = Pose  # six finite numbers
@@ -153,6 +155,19 @@ class Requirement(Part):
         return poses * len(self.wrenches) * len(self.accelerations) * len(self.winds or (0,))
 
 
+class Prices(Part):
+    """Prices of cables and winches, in any currency."""
+
+    cable: NonNegative = optional(
+        "price of a metre of cable; the length of a cable is its largest one at the required positions", 0.0
+    )
+    t_max: NonNegative = optional("price of a newton of the t_max of one cable", 0.0)
+
+    def cost(self, robot: Robot, cable: float) -> float:
+        """Return what the winches of a robot and a length of cable [m] cost."""
+        return self.t_max * float(robot.t_max.sum()) + self.cable * cable
+
+
 class Requirements(Part):
     """Requirements of a design: what is free, poses and wrenches. A requirement file is YAML with these keys."""
 
@@ -162,6 +177,11 @@ class Requirements(Part):
     )
     require: Annotated[tuple[Requirement, ...], Field(min_length=1, max_length=200)] = Field(
         description="poses and the wrenches to balance there"
+    )
+    tasks: Annotated[tuple[Task, ...], Field(max_length=20)] = optional(
+        "tasks, with the keys of task files, for each of which the resulting robot must have a feasible "
+        "plan; default: none",
+        (),
     )
     margin: Positive = optional(
         "smallest accepted capacity margin, with moments divided by the `length` of the robot's file [N]", 1.0
@@ -178,14 +198,24 @@ class Requirements(Part):
     cable_floor_clearance: NonNegative | None = optional(
         "smallest height of cables above the robot's floor [m]; default: no limit"
     )
+    natural_frequency: Positive | None = optional(
+        "smallest accepted natural frequency of the platform on elastic cables, with the tensions of least "
+        "norm that balance each required wrench [Hz]; default: no limit"
+    )
     cable_length: PositiveRange | None = optional(
         "shortest and longest length that the winches can give a cable, at the required positions [m]; "
         "default: no limit"
     )
-    maximise: Literal["margin"] = optional("objective: the smallest capacity margin", "margin")
-    minimise: Literal["t_max"] | None = optional(
-        "objective instead, with at least the margin `margin`: the mean t_max of the cables, which must be free"
+    maximise: Literal["margin", "natural_frequency", "volume"] = optional(
+        "objective: the smallest capacity margin; or, with at least the margin `margin`, the lowest "
+        "natural frequency, or the volume of the required boxes, which grow about their centres",
+        "margin",
     )
+    minimise: Literal["t_max", "cost"] | None = optional(
+        "objective instead, with at least the margin `margin`: the mean t_max of the cables, which must be "
+        "free, or the cost of cables and winches"
+    )
+    prices: Prices | None = optional("for minimise: cost, the prices of cables and winches")
     start: Literal["robot", "random"] = optional(
         "first layout: the robot's own, moved into the boxes, or a random one", "robot"
     )
@@ -196,8 +226,7 @@ class Requirements(Part):
     def _not_too_many(self) -> Self:
         if len(self.free) > 1 and any(each.pairing for each in self.free):
             raise ValueError(f"free must have no item besides a pairing, got {len(self.free) - 1} more")
-        if self.minimise is not None and not any(each.part == "t_max" for each in self.free):
-            raise ValueError("free must have an item with part t_max for minimise: t_max, got none")
+        self._check_objective()
         for number, place in enumerate(self.keep_out):
             for name in ("platform", "carriers"):
                 value = getattr(place, name)
@@ -207,6 +236,26 @@ class Requirements(Part):
         if size > MOST_ROWS:
             raise ValueError(f"require must have at most {MOST_ROWS} pairs of pose and wrench, got {size}")
         return self
+
+    def _check_objective(self) -> None:
+        """Raise ValueError if something is missing for the objective, or contradicts it."""
+        winches = any(each.part == "t_max" for each in self.free)
+        if self.minimise == "t_max" and not winches:
+            raise ValueError("free must have an item with part t_max for minimise: t_max, got none")
+        if (self.minimise == "cost") != (self.prices is not None):
+            wanted = "given for" if self.prices is None else "left out without"
+            raise ValueError(f"prices must be {wanted} minimise: cost")
+        if self.prices is not None and not (self.prices.cable > 0.0 or (winches and self.prices.t_max > 0.0)):
+            raise ValueError("prices must have one above 0 of something that is free: cable, or t_max if it is free")
+        if self.maximise != "margin" and self.minimise is not None:
+            raise ValueError(f"maximise must be left out with minimise, got {self.maximise!r}")
+        for name, usual in (("maximise", "margin"), ("minimise", None)):
+            if getattr(self, name) != usual and any(each.pairing for each in self.free):
+                wanted = "margin" if usual else "left out"
+                raise ValueError(f"{name} must be {wanted} with a pairing, got {getattr(self, name)!r}")
+        boxes = [each.box for each in self.require if each.box is not None]
+        if self.maximise == "volume" and not any(box.min != box.max for box in boxes):
+            raise ValueError("require must have a box with an extent for maximise: volume, got none")
 
 
 def read_requirements(requirements: Requirements | dict[str, Any] | str | os.PathLike[str]) -> Requirements:

@@ -15,6 +15,7 @@ from ..figures.robot import draw
 from ..models import Robot
 from ..models.dynamics import dynamics_of
 from ..models.parsing import to_yaml
+from ..ocp.plan import Plan
 from ..solvers import Certificate, solve
 from ..statics.distribution import wrench_problem
 from ..statics.scene import scene_at
@@ -38,16 +39,21 @@ class Design(Drawn, Reported, Displayed):
     - `robot`: the best robot found; that of the file if the requirements are impossible. `before`: the initial robot.
     - `requirements`: those of the design.
     - `status`: feasible if `robot` has the required margin (by `capacity_margin`, at the worst poses of the grid and of
-      an audit), distances and lengths of cables; infeasible if `impossibility` proves that no layout inside the boxes
-      meets the requirements; otherwise not-found, which proves nothing.
+      an audit), distances and lengths of cables, lowest natural frequency and plans of tasks; infeasible if
+      `impossibility` proves that no layout inside the boxes meets the requirements; otherwise not-found, which proves
+      nothing.
     - `margin`, `margin_before`: smallest capacity margin of both robots at the same poses, with moments divided by
       `before.length` [N].
     - `clearance`: smallest distance between two cables [m]; infinite for one cable.
-    - `judgement`: lengths and heights of cables, and distances from regions, at the required and at audited poses; None
-      if the requirements are impossible.
+    - `judgement`, `judgement_before`: lengths and heights of cables, distances from regions, and lowest natural
+      frequency of both robots at the required and at audited poses; None if the requirements are impossible.
     - `reasons`: active constraints and the gain from relaxing them; None if the requirements are impossible.
     - `poses`, `audited`: number of pairs of pose and wrench in the requirements, and of random ones in the last audit.
     - `starts`: number of initial layouts, or of compared pairings. `stopped`: whether the search was interrupted.
+    - `plans`: a plan of each task of the requirements; empty if the margin or the clearance is not as required.
+    - `size`, `size_before`: with `maximise: volume`, the factor by which all edges of the given boxes can be multiplied
+      so that `robot`, or `before`, still meets the requirements: 2 is 8 times the volume. `requirements` then has the
+      larger boxes.
     """
 
     robot: Robot
@@ -58,12 +64,16 @@ class Design(Drawn, Reported, Displayed):
     margin_before: float
     clearance: float
     judgement: Judgement | None
+    judgement_before: Judgement | None
     reasons: Reasons | None
     impossibility: Impossibility | None
     poses: int
     audited: int
     starts: int
     stopped: bool
+    plans: tuple[Plan, ...] = ()
+    size: float = 1.0
+    size_before: float | None = None
 
     @property
     def feasible(self) -> bool:
@@ -80,13 +90,38 @@ class Design(Drawn, Reported, Displayed):
         """Return the shortest and the longest length of a cable [m], or None if the requirements are impossible."""
         return None if self.judgement is None else self.judgement.lengths
 
+    @property
+    def cost(self) -> float | None:
+        """Return the cost of cables and winches, or None without prices."""
+        return self._cost_of(self.robot, self.judgement)
+
+    @property
+    def cost_before(self) -> float | None:
+        """Return the cost of the initial robot's cables and winches, or None without prices."""
+        return self._cost_of(self.before, self.judgement_before)
+
+    def _cost_of(self, robot: Robot, judgement: Judgement | None) -> float | None:
+        prices = self.requirements.prices
+        return None if prices is None or judgement is None else prices.cost(robot, judgement.cable)
+
     def _summary(self) -> str:
         if self.impossibility is not None:
             return "no layout inside the boxes meets the requirements"
         text = f"capacity margin {quantity(self.margin, 'N')} (before {quantity(self.margin_before, 'N')})"
+        if self.cost is not None and self.cost_before is not None:
+            text = f"cost {quantity(self.cost)} (before {quantity(self.cost_before)}), {text}"
         if self.requirements.minimise == "t_max":
             mean, before = (quantity(robot.t_max.mean(), "N") for robot in (self.robot, self.before))
             text = f"mean t_max {mean} (before {before}), {text}"
+        values = [None if found is None else found.frequency for found in (self.judgement, self.judgement_before)]
+        now, before = ("" if value is None else quantity(value, "Hz") for value in values)
+        frequency = f"lowest natural frequency {now} (before {before})" if now else ""
+        if self.size_before is not None:
+            size, before = (f"{one:.2f} times" for one in (self.size, self.size_before))
+            text = f"boxes {size} as long and wide as required (before {before}), {text}"
+        if self.requirements.maximise == "natural_frequency":
+            text, frequency = f"{frequency}, {text}", ""
+        text += f", {frequency}" * bool(frequency)
         if self.requirements.clearance > 0.0:
             text += f", cables {quantity(self.clearance, 'm')} apart"
         if self.requirements.cable_length is not None and self.lengths is not None:
@@ -117,11 +152,17 @@ class Design(Drawn, Reported, Displayed):
         facts = [
             ("searched", f"{searched}, audited at {quantity(self.audited)} random pair{'s' * (self.audited != 1)}")
         ]
+        if self.size_before is not None:
+            boxes = [each.box for each in self.requirements.require if each.box is not None]
+            facts += [("box", f"from {quantity_row(box.min)} to {quantity_row(box.max)} [m]") for box in boxes]
         if self.stopped:
-            facts.append(("", "INTERRUPTED: this is the best layout so far"))
+            unplanned = "; its tasks were not planned" * (len(self.plans) < len(self.requirements.tasks))
+            facts.append(("", f"INTERRUPTED: this is the best layout so far{unplanned}"))
+        facts += [("task", each.report().splitlines()[0]) for each in self.plans]
         if self.status == "not-found":
             wanted = [f"margin of {quantity(self.requirements.margin, 'N')}"]
             wanted += room_of(self.before, self.requirements).describe()
+            wanted += ["feasible plan of each task"] * bool(self.requirements.tasks)
             listed, them = ", ".join(f"a {each}" for each in wanted), "it" if len(wanted) == 1 else "all of these"
             facts.append(("wanted", f"{listed}; the search does not prove that no layout has {them}"))
         if self.judgement and self.judgement.closest and self.clearance < self.requirements.clearance:
@@ -189,7 +230,9 @@ class Design(Drawn, Reported, Displayed):
         return [Drawing(f"The robot {name} the design, {where}", figure) for name, figure in figures]
 
     def _why(self, found: Reasons) -> list[Part]:
-        gain = "margin +" if found.of_margin else "mean t_max -"
+        falls = {"t_max": "mean t_max -", "cost": "cost -"}
+        grows = "natural frequency +" if self.requirements.maximise == "natural_frequency" else "margin +"
+        gain = "margin +" if found.of_margin else falls.get(str(self.requirements.minimise), grows)
         gains = [
             (one.change, f"{gain}{quantity(one.gain, one.unit, digits=3)}" if one.gain > 1e-6 else "no effect")
             for one in found.advice
@@ -215,7 +258,7 @@ class Design(Drawn, Reported, Displayed):
     def to_dict(self) -> dict[str, Any]:
         """Return plain lists and numbers, ready for JSON."""
         found, judged, proof = self.reasons, self.judgement, self.impossibility
-        values = ("status", "feasible", "margin", "margin_before")
+        values = ("status", "feasible", "margin", "margin_before", "size", "size_before", "cost", "cost_before")
         binding = [] if found is None else [one._asdict() for one in found.binding]
         certificate = None
         if proof is not None:
@@ -228,8 +271,10 @@ class Design(Drawn, Reported, Displayed):
             "cable_lengths": None if self.lengths is None else list(self.lengths),
             "cable_distances": [] if judged is None else [list(one) for one in judged.distances],
             "cable_height": None if judged is None else judged.height,
+            "natural_frequency": None if judged is None else judged.frequency,
             "length": self.before.length,
             **{name: getattr(self, name) for name in ("poses", "audited", "starts", "stopped")},
+            "tasks": [{"task": each.scenario.task.name, "status": each.status} for each in self.plans],
             "local_optimum": None if found is None else found.local_optimum,
             "binding": [{name: np.asarray(value).tolist() for name, value in one.items()} for one in binding],
             "advice": [] if found is None else [one._asdict() for one in found.advice],

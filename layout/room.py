@@ -1,4 +1,4 @@
-"""`Room`: the bounds of a layout besides the margin: distances, lengths and heights of cables.
+"""`Room`: the bounds of a layout besides the margin: distances and lengths of cables, and the lowest frequency.
 
 A `Region` is a body from which the cables keep a distance, fixed in {G} or moving with the platform.
 """
@@ -69,13 +69,14 @@ def _distance(shape: Any, slopes: bool) -> ca.Function:
 
 
 class Room(NamedTuple):
-    """Bounds of distances, lengths and heights."""
+    """Bounds of distances, lengths, heights and frequencies."""
 
     clearance: float = 0.0  # smallest distance between two cables [m]; 0: no limit
     shortest: float = 0.0  # lengths of cables [m]
     longest: float = np.inf
     regions: tuple[Region, ...] = ()
     lowest: float = -np.inf  # height of cables in {G} [m]
+    frequency: float = 0.0  # lowest natural frequency [Hz]; 0: no limit
     size: float = 1.0  # of the robot [m]
 
     @property
@@ -84,13 +85,14 @@ class Room(NamedTuple):
         return self.shortest > 0.0 or self.longest < np.inf
 
     def with_spare(self, share: float) -> "Room":
-        """Return stricter bounds: distances that are larger by a share, lengths a little inside."""
+        """Return stricter bounds: distances and a frequency that are larger by a share, lengths a little inside."""
         least = _LEAST_SPARE * self.size
         return self._replace(
             clearance=self.clearance + share * max(self.clearance, least) if self.clearance > 0.0 else 0.0,
             shortest=self.shortest * (1.0 + _SPARE),
             longest=self.longest * (1.0 - _SPARE),
             regions=tuple(each._replace(least=each.least + share * max(each.least, least)) for each in self.regions),
+            frequency=self.frequency * (1.0 + share),
         )
 
     def describe(self) -> list[str]:
@@ -98,7 +100,8 @@ class Room(NamedTuple):
         found = [f"clearance of {quantity(self.clearance, 'm')}"] * (self.clearance > 0.0)
         found += [f"cable length of {quantity_range((self.shortest, self.longest), 'm')}"] * self.limits_lengths
         found += [f"distance of {quantity(each.least, 'm')} between cables and {each.name}" for each in self.regions]
-        return found + [f"height of cables of {quantity(self.lowest, 'm')}"] * (self.lowest > -np.inf)
+        found += [f"height of cables of {quantity(self.lowest, 'm')}"] * (self.lowest > -np.inf)
+        return found + [f"natural frequency of {quantity(self.frequency, 'Hz')}"] * (self.frequency > 0.0)
 
 
 def room_of(robot: Robot, requirements: Requirements) -> Room:
@@ -117,6 +120,7 @@ def room_of(robot: Robot, requirements: Requirements) -> Room:
         *((0.0, np.inf) if lengths is None else (lengths.min, lengths.max)),
         regions=tuple(_regions(robot, requirements)),
         lowest=-np.inf if height is None or robot.floor is None else robot.floor + height,
+        frequency=requirements.natural_frequency or 0.0,
         size=robot.size,
     )
 

@@ -11,8 +11,10 @@ from ..base.errors import InputError
 from ..base.inputs import shown
 from ..models import Robot
 from ..models.files import AnyRobot, as_robot
-from .evaluation import NO_BOUNDS, Evaluation, rows_of
+from ..ocp.planner import plan
+from .evaluation import NO_BOUNDS, Evaluation, rows_of, with_tasks
 from .goal import goal_of
+from .growth import grow
 from .impossibility import find_impossibility
 from .judgement import judge, judged_margin
 from .pairings import best_pairing, with_attachments
@@ -43,11 +45,12 @@ def design(
     - `robot`: a `Robot`, the name of one in the library, or the path of a robot file.
     - `free`: numbers to choose: `Free`, or mappings with its keys.
     - `require`: poses and wrenches: `Requirement`, or mappings with its keys.
-    - `maximise`: objective: "margin". With the option minimise="t_max", the mean t_max is minimised instead, and the
-      option `margin` is the smallest accepted one.
+    - `maximise`: objective: "margin", "natural_frequency" or "volume" (of the boxes). With the option minimise="t_max"
+      or "cost", the mean t_max or the cost is minimised instead, and the option `margin` is the smallest accepted one.
     - `requirements`: instead of all of these: `Requirements`, a mapping, or the path of a file.
     - `progress`: called with a description of the step, the elapsed share of the time, and the best margin so far [N].
-    - `options`: all other keys of `Requirements`, such as minimise, margin, clearance and time_limit.
+    - `options`: all other keys of `Requirements`, such as minimise, prices, margin, clearance, natural_frequency, tasks
+      and time_limit.
 
     After an interrupt the result is the best so far; it has a certificate if the requirements are impossible.
 
@@ -79,23 +82,32 @@ def design(
     # Of other pairings the boxes of the robot's own points prove nothing.
     impossible = None if wanted.free[0].pairing else find_impossibility(variables, grid)
     if impossible is not None:
-        before, clearance = judged_margin(chosen, chosen.length, grid), judge(chosen, grid, NO_BOUNDS).clearance
+        before, clearance = judged_margin(chosen, chosen.length, grid), judge(chosen, grid, NO_BOUNDS, False).clearance
         return Design(
             chosen, chosen, wanted, "infeasible", before, before, clearance, None,
-            None, impossible, len(grid.pose_of), 0, 0, False,
+            None, None, impossible, len(grid.pose_of), 0, 0, False,
         )  # fmt: skip
     if wanted.free[0].pairing:
         cables = tuple(number - 1 for number in wanted.free[0].cables or range(1, chosen.m + 1))
+        grid = with_tasks(grid, chosen, wanted.tasks)
         attachment_of, count = best_pairing(chosen, grid, cables, wanted)
         paired = variables_of(with_attachments(chosen, attachment_of), wanted)
         best = Found(goal_of(paired, wanted), np.zeros(0), grid, starts=count)
         return _designed(chosen, paired, wanted, best, len(grid.pose_of))
-    found = search(variables, wanted, progress or (lambda what, share, best: None))
+    on_progress, largest = progress or (lambda what, share, best: None), None
+    if wanted.maximise == "volume":
+        largest = grow(variables, wanted, on_progress)
+        wanted, found = largest.requirements, largest.found
+    else:
+        found = search(variables, wanted, on_progress)
     count = len(grid.pose_of)
     try:
-        return _best_of(chosen, variables, wanted, found, count)
-    except KeyboardInterrupt:  # judged again
-        return _best_of(chosen, variables, wanted, replace(found, stopped=True), count)
+        result = _best_of(chosen, variables, wanted, found, count)
+    except KeyboardInterrupt:  # judged again, without the plans of tasks, which take long
+        result = _best_of(chosen, variables, wanted, replace(found, stopped=True), count)
+    if largest is not None:
+        result = replace(result, size=largest.size, size_before=largest.size_before)
+    return result
 
 
 def _best_of(chosen: Robot, variables: Variables, wanted: Requirements, found: Found, count: int) -> Design:
@@ -115,19 +127,22 @@ def _best_of(chosen: Robot, variables: Variables, wanted: Requirements, found: F
 
 def _designed(before: Robot, variables: Variables, wanted: Requirements, found: Found, count: int) -> Design:
     """Judge a layout, whose search had `count` rows, at all rows and at new random poses, and find the reasons."""
-    y, rows, room = found.y, found.rows, room_of(before, wanted)
+    y, rows, goal, room = found.y, found.rows, found.goal, room_of(before, wanted)
     robot = variables.robot_at(y)
     random = np.random.default_rng([wanted.seed, 1])
     audited = audited_rows(before, wanted, random)
     every = rows.joined(audited)
     margin = judged_margin(robot, before.length, every)
     placed = Evaluation(variables, rows.joined(few(audited, random, ROOM_AUDITED)), room)
-    judgement = judge(robot, placed.rows, room)
+    counts = room.frequency > 0.0 or goal.per_hertz > 0.0
+    judgement = judge(robot, placed.rows, room, counts)
     feasible = margin >= wanted.margin and placed.missing(y) <= 0.0 and judgement.keeps(room)
-    why = reasons(Evaluation(variables, rows, room), found.goal, y)
+    plans = tuple(plan(robot, task) for task in wanted.tasks) if feasible and not found.stopped else ()
+    feasible &= len(plans) == len(wanted.tasks) and all(each.feasible for each in plans)
+    why = reasons(Evaluation(variables, rows, room), goal, y)
     return Design(
         robot, before, wanted, "feasible" if feasible else "not-found", margin,
         judged_margin(before, before.length, every), float(placed.distances(y).min(initial=np.inf)), judgement,
-        why, None, count, len(audited.pose_of),
-        found.starts, found.stopped,
+        judge(before, placed.rows, room, counts), why, None, count, len(audited.pose_of),
+        found.starts, found.stopped, plans,
     )  # fmt: skip

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..models import Robot
 from .annealing import Moves, anneal
-from .evaluation import Evaluation, Rows, rows_of
+from .evaluation import FEW_INSTANTS, Evaluation, Rows, rows_of, with_tasks
 from .goal import NOTHING, Goal, Outcome, goal_of
 from .linear_programs import PROGRAMS, maximise, merit
 from .requirements import Requirements
@@ -23,7 +23,7 @@ from .variables import Variables
 Progress = Callable[[str, float, float], None]  # what is being done, the share of time, the best margin so far [N]
 
 AUDITED = 100_000  # random poses
-ROOM_AUDITED = 10_000  # of them, for distances
+ROOM_AUDITED = 10_000  # of them, for distances and frequencies
 FEW = 32  # rows for annealing
 _ADDED, _APART = 20, 0.03  # worst poses that an audit adds, and how far apart they are, in sizes of the robot
 _ROUNDS = 6  # audits at the end
@@ -53,9 +53,14 @@ class Found:
         return self.goal.better(y, outcome, self.y, self.outcome)
 
 
-def search(variables: Variables, requirements: Requirements, progress: Progress) -> Found:
-    """Search until the time limit for the layout with the largest margin; an interrupt ends it with the best so far."""
-    search = _Search(variables, requirements, progress)
+def search(
+    variables: Variables, requirements: Requirements, progress: Progress, first: np.ndarray | None = None
+) -> Found:
+    """Search until the time limit for the layout with the largest margin; an interrupt ends it with the best so far.
+
+    The first layout is the robot's own unless another is given, (p,).
+    """
+    search = _Search(variables, requirements, progress, variables.of_robot() if first is None else first)
     try:
         search.run()
     except KeyboardInterrupt:
@@ -66,8 +71,8 @@ def search(variables: Variables, requirements: Requirements, progress: Progress)
 class _Search:
     """The state of a search."""
 
-    def __init__(self, variables: Variables, requirements: Requirements, progress: Progress):
-        robot, require = variables.robot, requirements.require
+    def __init__(self, variables: Variables, requirements: Requirements, progress: Progress, first: np.ndarray):
+        robot, require, tasks = variables.robot, requirements.require, requirements.tasks
         self._started = time.perf_counter()
         self._until = self._started + requirements.time_limit
         self._variables, self._requirements, self._progress = variables, requirements, progress
@@ -77,10 +82,11 @@ class _Search:
             each.places(tuple(min(count, 3) for count in each.grid)) for each in require
         ]  # middles and centre too
         coarse = few(rows_of(robot, require, corners), self._rng, FEW)
-        self._coarse = Evaluation(variables, coarse, self._room.with_spare(_FEW_SPARE))
-        rows = rows_of(robot, require, [each.places() for each in require])
-        self.found = Found(goal_of(variables, requirements), variables.of_robot(), rows)
-        self._y = self.found.y.copy()  # of the layout that is improved
+        rows = with_tasks(coarse, robot, tasks, FEW_INSTANTS)
+        self._coarse = Evaluation(variables, rows, self._room.with_spare(_FEW_SPARE))
+        rows = with_tasks(rows_of(robot, require, [each.places() for each in require]), robot, tasks)
+        self.found = Found(goal_of(variables, requirements), first, rows)
+        self._y = first.copy()  # of the layout that is improved
         self._free = self._best_moves = Moves(variables)
 
     def run(self) -> None:
@@ -106,7 +112,7 @@ class _Search:
         """Keep the layout that was being improved, if it is better."""
         found = self.found
         found.stopped = True
-        outcome = Evaluation(self._variables, found.rows, self._room).outcome(self._y)
+        outcome = Evaluation(self._variables, found.rows, self._room).outcome(self._y, found.goal)
         if found.better(self._y, outcome):
             found.y = self._y
 
@@ -192,15 +198,22 @@ class _Search:
         Return its outcome if only poses of the audit make it worse than the best one or miss the requirements.
         """
         found = self.found
-        promised = Evaluation(self._variables, found.rows, self._room).outcome(y)
+        promised = Evaluation(self._variables, found.rows, self._room).outcome(y, found.goal)
         if not found.better(y, promised):
             return None  # the audit can only find less
         audited, worst = self._audit(y, promised)
-        least = promised.margin - _SAME * abs(promised.margin)
-        agrees = audited.missing <= promised.missing and audited.margin >= least
+        agrees = audited.missing <= promised.missing and all(
+            found >= wanted - _SAME * abs(wanted)
+            for found, wanted in ((audited.margin, promised.margin), (audited.frequency, promised.frequency))
+        )
         if not agrees:
             found.rows = found.rows.joined(worst)
-        outcome = Outcome(min(audited.margin, promised.margin), max(audited.missing, promised.missing))
+        outcome = Outcome(
+            min(audited.margin, promised.margin),
+            max(audited.missing, promised.missing),
+            min(audited.frequency, promised.frequency),
+            max(audited.cable, promised.cable),
+        )
         if found.better(y, outcome):
             found.y, found.outcome, found.audit_agrees = y.copy(), outcome, agrees
             agrees |= self._met()
@@ -208,17 +221,23 @@ class _Search:
 
     def _audit(self, y: np.ndarray, promised: Outcome) -> tuple[Outcome, Rows]:
         """Return the result at random poses, and the worst of those that are worse than promised."""
-        variables, rng = self._variables, self._rng
+        variables, goal, rng = self._variables, self.found.goal, self._rng
         rows = audited_rows(variables.robot, self._requirements, rng)
         values = Evaluation(variables, rows).margins(y)
         worst, margin = rows.only(_apart(rows, values, promised.margin, self._room.size)), float(values.min())
         some = few(rows, rng, ROOM_AUDITED)
-        spaces, short = Evaluation(variables, some, self._room).spaces(y), 0.0
+        evaluation = Evaluation(variables, some, self._room)
+        spaces, short = evaluation.spaces(y), 0.0
+        outcome = evaluation.outcome_besides(y, goal._replace(per_hertz=0.0), margin)
         if spaces.size:
             least = spaces.min(axis=1)[some.pose_of]
             short = max(0.0, -float(least.min()))
             worst = worst.joined(some.only(_apart(some, least, -promised.missing, self._room.size)))
-        return Outcome(margin, short), worst
+        if goal.per_hertz:
+            frequencies = evaluation.frequencies(y)[:, 0]
+            outcome = outcome._replace(frequency=float(frequencies.min()))
+            worst = worst.joined(some.only(_apart(some, frequencies, promised.frequency, self._room.size)))
+        return outcome._replace(missing=short), worst
 
 
 def audited_rows(robot: Robot, requirements: Requirements, rng: np.random.Generator) -> Rows:

@@ -113,6 +113,8 @@ def variables_of(robot: Robot, requirements: Requirements) -> Variables:
     for row, (column, sign) in column_of.items():
         S[row, column], fixed[row] = sign, 0.0
     found = Variables(robot, S, fixed, np.array(low), np.array(high), tuple(names), tuple(points))
+    if requirements.maximise == "natural_frequency" or requirements.natural_frequency is not None:
+        _check_elastic(robot, parts(found.layout(found.low), robot.m)[2])
     t_min = parts(found.fixed + np.maximum(S, 0) @ found.high, robot.m)[2]
     lowest = parts(found.layout(found.low), robot.m)[3]
     if not (t_min < lowest).all():
@@ -148,6 +150,20 @@ def _check(robot: Robot, requirements: Requirements) -> None:
             source = taken.get((free.part, cable))
             if source is not None and requirements.free[source].copy_of is not None:
                 raise InputError(f"free[{number}].copy_of must name cables that are not copies themselves, got {cable}")
+
+
+def _check_elastic(robot: Robot, lowest: np.ndarray) -> None:
+    """Raise InputError if a cable has no stiffness, or may have no tension (m,), and so no stiffness either."""
+    for index, cable in enumerate(robot.cables):
+        if cable.stiffness is None:
+            raise InputError(
+                f"cables[{index}].stiffness must be given for natural_frequency, got none in robot {robot.name!r}"
+            )
+        if not lowest[index] > 0.0:
+            raise InputError(
+                f"t_min of cable {index + 1} must be above 0 N for natural_frequency, as a cable without tension has "
+                f"no stiffness, got {lowest[index]:g} N in robot {robot.name!r}"
+            )
 
 
 def _layout_of(robot: Robot) -> np.ndarray:

@@ -44,7 +44,7 @@ def sensitivity(problem: TensionProblem, solution: TensionSolution) -> Array:
     Args:
         problem: The problem.
         solution: Its solution by a method that solves the quadratic program ("active-set", "min-norm" without
-            `lambda_`, "qp", "2-norm").
+            `lambda_`, "qp", "2-norm", "dykstra").
 
     Returns:
         dt_i / dw_j, shape (m, n) [N per N, N per N m]. The tensions are piecewise linear in w. Where pieces meet (a

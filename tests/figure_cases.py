@@ -10,6 +10,7 @@ import xarray as xr
 
 from towline import load
 from towline.figures import calibration, flight, limits, phase_plane, plan, robot, sweep, workspace
+from towline.figures.convergence import convergence
 from towline.figures.curves import Panel, curve_in_space, curves
 from towline.figures.envelopes import envelopes
 from towline.figures.metric_map import metric_map
@@ -239,6 +240,7 @@ def _ball(count: int, radius: float) -> np.ndarray:
     return radius * points / np.linalg.norm(points, axis=1, keepdims=True)
 
 
+RUNS = [(k, 3.0 / (k + 1), 10.0**-k) for _ in range(3) for k in range(6)]
 SQUARE = np.array([[1, 1, 1.0], [-1, 1, 1], [-1, -1, 1], [1, -1, 1]])
 
 FIGURES: dict[str, Callable[[], Figure]] = {
@@ -257,6 +259,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "views": lambda: views(scene()),
     "views-high": lambda: views(scene(height=30.0)),
     "limits": lambda: limits.limits(TIME, limited()),
+    "convergence": lambda: convergence(RUNS),
     "flight": lambda: flight.flight(flown()),
     "flight-tensions": lambda: flight.tensions(flown()),
     "flight-tensions-8": lambda: flight.tensions(flown(cables=8, wind=False)),

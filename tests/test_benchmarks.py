@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from towline import Dynamics, TensionProblem
 from towline.base.errors import InputError
-from towline.benchmarks import planning, tension
+from towline.benchmarks import design, planning, tension
 from towline.benchmarks.qp_solver import multipliers, register, solve_problem
 from towline.benchmarks.tension_contenders import REFERENCE, Contender, contenders
 from towline.benchmarks.tension_tasks import KINDS, make_task
 from towline.cli.bench import results_alone
-from towline.solvers import certify
+from towline.solvers import capacity_margin, certify
 
 from . import warm
 from .references import optimum_by_enumeration
@@ -234,3 +235,26 @@ def test_all_plan_the_same_circle():
     assert lines[2].startswith("| towline | ")
     assert lines[2].count(" s | 1.00 | ") == 2
     assert "| passed, " in lines[2]
+
+
+def test_all_search_the_same_layouts():
+    """The score of the published layout is its smallest capacity margin, and every contender finds a layout in time."""
+    task = design.Task("ipanema-2", 0.2, seed=1)
+    robot, variables = task.variables.robot, task.variables
+    share = (variables.of_robot() - variables.low) / (variables.high - variables.low)
+    places = task.requirements.require[0].places()
+    w = Dynamics(robot).required_wrench(robot.home, np.zeros(6), np.zeros(6))
+    A = Dynamics(robot).wrench_matrix(places)
+    problems = (TensionProblem(each, w, robot.t_min, robot.t_max, length=robot.length) for each in A)
+    least = min(capacity_margin(problem).value for problem in problems)
+    assert task.score(share) == pytest.approx(least, abs=1e-9)
+    assert task.judged(variables.of_robot()) <= least
+    assert task.score(task.draws()[0]) >= task.score(task.draws()[-1])
+    pytest.importorskip("pymoo")
+    pytest.importorskip("cma")
+    found = design.measure("ipanema-2", 0.2, 1)
+    assert list(found) == ["towline", "pymoo GA", "cma", "cma, drawn"]
+    assert all(np.isfinite(each).all() for each in found.values())
+    lines = design.table({"ipanema-2": found})
+    assert len(lines) == 2 + len(found)
+    assert lines[2].endswith("| 1.00 |")

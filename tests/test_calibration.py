@@ -11,7 +11,7 @@ from scipy.sparse import lil_matrix
 from scipy.spatial.transform import Rotation
 
 from towline.base.errors import InputError
-from towline.estimation.calibration import Measurements, calibrate
+from towline.estimation.calibration import Measurements, calibrate, next_poses
 from towline.estimation.calibration.clock import begin_with_clock
 from towline.estimation.calibration.geometry import length_of
 from towline.estimation.calibration.model import Model, State
@@ -452,6 +452,29 @@ def test_more_noise_than_stated_is_no_slip(seed):
     assert result.noise == pytest.approx(3 * NOISE, rel=0.1)
     assert not result.slips
     assert not result.outliers
+
+
+def test_chosen_poses_tell_more_than_random_ones():
+    robot = load("cogiro")
+    draw = np.random.default_rng(0)
+    candidates = random_poses(robot, 300, draw)
+
+    def spread(poses):
+        lengths = Dynamics(robot).cable_lengths(poses)
+        return np.linalg.slogdet(calibrate(robot, Measurements(lengths, poses)).covariance)[1]
+
+    chosen = next_poses(robot, candidates, count=15)
+    assert all((pose == candidates).all(axis=1).any() for pose in chosen)
+    random = [spread(candidates[draw.choice(300, 15, replace=False)]) for _ in range(5)]
+    assert spread(chosen) < min(random) - 5
+    first = candidates[:12]
+    so_far = calibrate(robot, Measurements(Dynamics(robot).cable_lengths(first), first))
+    more = next_poses(so_far, candidates, count=5)
+    assert spread(np.vstack([first, more])) < min(
+        spread(np.vstack([first, candidates[draw.choice(300, 5)]])) for _ in range(5)
+    )
+    default = next_poses(robot, count=3)  # poses at which the robot can rest
+    assert default.shape == (3, 6)
 
 
 def test_tensions_lengthen_cables_with_a_stiffness():

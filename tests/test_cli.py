@@ -198,7 +198,8 @@ def test_plan_writes_a_report_and_a_film(tmp_path):
     page = (tmp_path / "out" / "plan.html").read_text()
     assert page.startswith("<!DOCTYPE html>")
     assert f"{answer['tension_min']:.4g}\u00a0N in cable" in page  # on one line
-    assert "limits.png" in [Path(picture).name for picture in answer["figures"]]
+    assert "Convergence of the solver" in page
+    assert "convergence.png" in [Path(picture).name for picture in answer["figures"]]
     with Image.open(tmp_path / "out" / "plan.gif") as film:
         seconds = 2 * 2 * np.pi / 3
         assert film.n_frames == int(4 * seconds) + 1

@@ -155,6 +155,6 @@ def test_both_ends_of_a_range_have_one_unit(capsys):
     """A robot of a millimetre has bounds in millimetres at both ends of a range, not in metres at one of them."""
     summary = {"robot": "micro", "accepted": 9, "samples": 10, "volume": 2e-6, "volume_unit": "m^2", "seconds": 1.0}
     summary |= {"volume_interval": [np.nan, np.nan], "bounds": {"x": [-7.754e-4, 7.831e-4], "y": [0.0, 0.0]}}
-    _show(xr.Dataset(), summary, None)
+    _show(xr.Dataset(), summary, None, None)
     printed = capsys.readouterr().out.splitlines()
     assert printed[2:4] == ["  x -0.78 to 0.78 mm", "  y 0 m"]

@@ -9,7 +9,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from towline import Dynamics, InputError, Requirements, TensionProblem, core, design, load, read_requirements
+from towline import (
+    Dynamics,
+    InputError,
+    Requirements,
+    Robot,
+    TensionProblem,
+    core,
+    design,
+    load,
+    plan,
+    read_requirements,
+)
 from towline.layout import Free, run
 from towline.layout import search as searching
 from towline.layout.evaluation import Evaluation, rows_of
@@ -321,12 +332,10 @@ def test_an_interrupt_while_the_layout_is_judged_keeps_it(monkeypatch):
     assert result.margin > result.margin_before
 
 
-def test_from_random_layouts_and_for_equal_and_mirrored_points(monkeypatch):
-    """One start that knows nothing of the published layout, at any speed; a symmetric robot stays symmetric."""
+def test_from_random_layouts_and_for_equal_and_mirrored_points():
+    """A start that knows nothing of the published layout; a symmetric robot stays symmetric."""
     robot = load("ipanema-2")
-    monkeypatch.setattr(searching, "_SEARCHING", 0.0)
-    monkeypatch.setattr(searching, "AUDITED", 20_000)
-    result = design(robot, requirements=wanted(robot, start="random", time_limit=60.0, seed=3))
+    result = design(robot, requirements=wanted(robot, start="random", time_limit=1.0, seed=3))
     assert result.margin > result.margin_before
     box = around(robot.anchors)
     box["min"][0] = 0.5
@@ -378,6 +387,10 @@ HOSTILE = [
     ({"time_limit": 0}, "time_limit"),
     ({"seed": 1.5}, "seed"),
     ({"sed": 1}, "did you mean 'seed'"),
+    ({"maximise": "natural_frequency"}, r"cables\[0\].stiffness must be given for natural_frequency"),
+    ({"natural_frequency": 3}, "stiffness must be given"),
+    ({"natural_frequency": 0}, "natural_frequency"),
+    ({"natural_frequency": float("nan")}, "natural_frequency"),
     ({"cable_platform_clearance": 0.1}, "without platform.body"),
     ({"cable_floor_clearance": 0.1}, "without a floor"),
     ({"cable_floor_clearance": -1}, "cable_floor_clearance"),
@@ -385,8 +398,9 @@ HOSTILE = [
     ({"keep_out": [{**BALL, "platform": 0.2}]}, r"keep_out\[0\].platform must be left out"),
     ({"keep_out": [{**BALL, "carriers": None}]}, r"keep_out\[0\].carriers must be left out"),
     ({"keep_out": 3}, "keep_out"),
-    ({"maximise": "volume"}, "maximise"),
-    ({"minimise": "t_max", "free": [{"part": "attachment", "pairing": True}]}, "part t_max for minimise"),
+    ({"maximise": "natural_frequency", "minimise": "t_max",
+      "free": [{"part": "t_max", "range": {"min": 100, "max": 900}}]}, "maximise must be left out with minimise"),
+    ({"maximise": "natural_frequency", "free": [{"part": "attachment", "pairing": True}]}, "margin with a pairing"),
 ]  # fmt: skip
 
 
@@ -558,6 +572,26 @@ def test_a_robot_that_meets_the_requirements_is_never_replaced_by_one_that_does_
     assert hardly.feasible, hardly.report()
     assert np.allclose(hardly.robot.t_max, robot.t_max)
     assert not design(robot, requirements=requirements | {"margin": 30.0}).feasible
+
+
+def test_winches_are_strong_enough_for_a_task_and_not_much_stronger():
+    """A fast lift needs more than rest does; with 0.95 of the tensions that `design` finds it is infeasible."""
+    robot, path = load("ipanema-2"), {"kind": "line", "start": [0, 0, 2.2], "end": [0, 0, 2.8]}
+    task = {"name": "fast", "path": path, "duration": 0.3}
+    rest = {"poses": [[0, 0, 2.5, 0, 0, 0]]}
+    given = {"free": [winches(robot)], "require": [rest], "minimise": "t_max", "time_limit": 0.3}
+    found = design(robot, **given, tasks=[task])
+    assert found.feasible
+    assert "ipanema-2, fast: FEASIBLE" in found.report()
+    assert found.robot.t_max.max() > 2 * design(robot, **given).robot.t_max.max()
+    cables = [{**cable.model_dump(), "t_max": 0.95 * cable.t_max} for cable in found.robot.cables]
+    weaker = Robot.model_validate(found.robot.model_dump() | {"cables": cables})
+    assert plan(weaker, task).status == "infeasible"
+    weak = design(robot, [winches(robot) | {"range": {"min": 50, "max": 100}}], [rest], time_limit=0.3, tasks=[task])
+    assert weak.status == "not-found"
+    assert "feasible plan of each task" in weak.report()
+    with pytest.raises(InputError, match=r"tasks\[0\]\.path"):
+        design(robot, **given, tasks=[{"name": "pathless"}])
 
 
 @pytest.mark.parametrize("name", ["ipanema-2", "caroca-pulleys"])

@@ -38,6 +38,8 @@ def test_a_better_robot_is_found(command, monkeypatch):
     assert found.feasible
     assert found.margin > found.margin_before
     assert found.margin >= wanted.margin
+    for plan in found.plans:
+        assert plan.feasible
     if wanted.minimise == "t_max":
         assert found.robot.t_max.max() < 0.5 * before.t_max.max()
     (required,) = wanted.require

@@ -81,6 +81,7 @@ NOT_CALLED = {
     "Parameter",
     "Sigma",
     "Slip",
+    "StiffestTensions",
     "ANSWERS",
     "METRICS",
     "Command",  # what an author of a controller gets and writes

@@ -26,6 +26,7 @@ CLOSED = ("closed-form", "improved-closed-form")
 CENTRELESS = {"no limits at all", "no upper limit"}
 DECLINED = {
     "centroid": CENTRELESS,
+    "analytic-centre": CENTRELESS,
     "least-sum": {"no limits at all"},
     "largest-margin": CENTRELESS,
     "min-max": {"no limits at all"},
@@ -61,7 +62,7 @@ def test_every_feasible_problem_is_solved_by_methods_that_say_so(method):
     for k in range(80):
         problem = random_feasible(rng, 3 + k % 8)
         counts[solve(problem, method).status] += 1
-    if method in ALWAYS_FIND:
+    if method in ALWAYS_FIND or method == "dykstra":
         assert counts["failed"] == 0
     else:
         assert counts["optimal"] >= (60 if method == "improved-closed-form" else 30)
@@ -88,7 +89,7 @@ def best_along(problem, gradient):
 
 def test_methods_that_solve_the_same_problem_agree():
     rng = np.random.default_rng(32)
-    same = [("2-norm", {}), ("soft-wrench", {})]
+    same = [("2-norm", {}), ("dykstra", {}), ("soft-wrench", {}), ("p-norm", {"p": 2})]
     for k in range(40):
         m = 6 + k % 5
         problem = inner_problem(rng, m, t_ref=rng.uniform(0, 60, m), weights=10.0 ** rng.uniform(-1, 1, m))
@@ -128,18 +129,33 @@ def test_linear_programs_reach_the_optimum_of_a_plain_formulation():
         assert solve(problem, "min-max").tensions.max() == pytest.approx(low.fun, rel=1e-6)
 
 
-def test_the_barrier_is_stationary_and_strictly_inside():
+@pytest.mark.parametrize(("p", "spread"), [(3, 1), (4, 1), (8, 1), (8, 3), (20, 3)])
+def test_p_norm_is_optimal(p, spread):
+    """Check that no feasible direction goes down: the gradient's best feasible point is the answer itself."""
+    rng = np.random.default_rng(35)
+    for k in range(20):
+        m = 7 + k % 3
+        problem = inner_problem(rng, m, t_ref=30.0 * (k % 2), weights=10.0 ** rng.uniform(-spread, spread, m))
+        t = solve(problem, "p-norm", p=p).tensions
+        apart = np.sqrt(problem.weights) * (t - problem.t_ref)
+        size = np.abs(apart).max()
+        gradient = np.sqrt(problem.weights) * np.sign(apart) * np.abs(apart / size) ** (p - 1)
+        assert gradient @ t - best_along(problem, gradient) <= 1e-6 * (np.abs(gradient) @ np.abs(t))
+
+
+def test_barrier_methods_are_stationary_and_strictly_inside():
     rng = np.random.default_rng(36)
     for k in range(20):
         m = 7 + k % 4
         problem = inner_problem(rng, m, t_ref=rng.uniform(0, 60, m))
         null = np.linalg.svd(problem.A)[2][6:]
-        t = solve(problem, "log-barrier").tensions
-        assert (t > T_MIN).all()
-        assert (t < T_MAX).all()
-        mu = (0.01 * (T_MAX - T_MIN)) ** 2
-        gradient = t - problem.t_ref + mu * (1 / (T_MAX - t) - 1 / (t - T_MIN))
-        assert np.abs(null @ gradient).max() <= 1e-7 * np.abs(gradient).max()
+        for method, mu in (("log-barrier", (0.01 * (T_MAX - T_MIN)) ** 2), ("analytic-centre", 1.0)):
+            t = solve(problem, method).tensions
+            assert (t > T_MIN).all()
+            assert (t < T_MAX).all()
+            pull = mu * (1 / (T_MAX - t) - 1 / (t - T_MIN))
+            gradient = pull if method == "analytic-centre" else t - problem.t_ref + pull
+            assert np.abs(null @ gradient).max() <= 1e-7 * np.abs(gradient).max()
 
 
 def on_a_face(rng):
@@ -164,7 +180,7 @@ def test_on_the_boundary_methods_keep_their_own_criterion():
         problem, held = on_a_face(rng)
         nearest = solve(problem)
         assert nearest.feasible
-        for method in ("centroid", "log-barrier"):
+        for method in ("centroid", "analytic-centre", "log-barrier"):
             solution = solve(problem, method)
             assert solution.feasible
             t = solution.tensions[:4]
@@ -214,18 +230,19 @@ def test_log_barrier_tends_to_the_least_squares_as_its_weight_falls():
 def test_a_warm_start_saves_newton_steps():
     rng = np.random.default_rng(38)
     A, t = geometric_matrix(rng, 8), rng.uniform(5, 50, 8)
-    cold, warm, last = [], [], None
-    for phase in np.linspace(0, 1, 40):
-        problem = TensionProblem(A, A @ (t + 4 * np.sin(6 * phase + np.arange(8))), T_MIN, T_MAX)
-        first = solve(problem, "log-barrier")
-        cold.append(first.iterations)
-        if last is not None:
-            again = solve(problem, "log-barrier", start=last)
-            warm.append(again.iterations)
-            np.testing.assert_allclose(again.tensions, first.tensions, rtol=0, atol=1e-7)
-        last = first.tensions
-    print("Newton steps, cold and warm:", np.median(cold), np.median(warm))
-    assert np.median(warm) < np.median(cold)
+    for method in ("log-barrier", "analytic-centre"):
+        cold, warm, last = [], [], None
+        for phase in np.linspace(0, 1, 40):
+            problem = TensionProblem(A, A @ (t + 4 * np.sin(6 * phase + np.arange(8))), T_MIN, T_MAX)
+            first = solve(problem, method)
+            cold.append(first.iterations)
+            if last is not None:
+                again = solve(problem, method, start=last)
+                warm.append(again.iterations)
+                np.testing.assert_allclose(again.tensions, first.tensions, rtol=0, atol=1e-7)
+            last = first.tensions
+        print(method, "Newton steps, cold and warm:", np.median(cold), np.median(warm))
+        assert np.median(warm) < np.median(cold)
 
 
 def test_the_centroid_of_shapes_that_everybody_knows():
@@ -317,7 +334,7 @@ def test_methods_that_claim_continuity_do_not_jump(method):
     print(method, result)
     assert result.worst <= JUMP
     assert result.unanswered == 0
-    assert result.inaccurate == 0
+    assert result.inaccurate == 0 or method == "dykstra"
 
 
 def test_the_continuity_test_can_see():
@@ -333,8 +350,10 @@ def test_soft_wrench_does_not_jump_as_the_wrench_leaves_the_set(options):
     assert result.inaccurate > 100
 
 
-@pytest.mark.parametrize(("method", "smooth"), [("log-barrier", True), ("active-set", False)])
-def test_the_barrier_has_a_continuous_derivative_and_least_squares_has_not(method, smooth):
+@pytest.mark.parametrize(
+    ("method", "smooth"), [("log-barrier", True), ("analytic-centre", True), ("active-set", False)]
+)
+def test_barrier_methods_have_a_continuous_derivative_and_least_squares_has_not(method, smooth):
     worst = smoothness(method, range(8), **SMOOTH.get(method, {})).worst
     print(f"{method}: {worst:.1e} of a change of the derivative left")
     assert worst <= JUMP if smooth else worst > 0.1
@@ -382,6 +401,8 @@ def test_rate_limits_hold_for_every_method():
 @pytest.mark.parametrize(
     ("method", "options", "message"),
     [
+        ("p-norm", {"p": 1}, "p must be a number from 2 to 20, got 1"),
+        ("dykstra", {"max_iter": 0}, "max_iter must be a whole number from 1 .*, got 0"),
         ("log-barrier", {"barrier": "big"}, "barrier must be a number .*, got 'big'"),
         ("log-barrier", {"start": [1, 2]}, r"start must be .* of shape \(8,\) of finite numbers, got .* \(2,\)"),
         ("soft-wrench", {"rho": -1}, "rho must be a number .*, got -1"),
@@ -391,6 +412,15 @@ def test_rate_limits_hold_for_every_method():
 def test_wrong_options_are_told(method, options, message):
     with pytest.raises(InputError, match=message):
         solve(inner_problem(np.random.default_rng(44), 8), method, **options)
+
+
+def test_dykstra_says_how_far_it_came():
+    rng = np.random.default_rng(45)
+    problem = inner_problem(rng, 8, t_ref=[-50, 0, 0, 200, 0, 9, 90, 10])
+    rough = solve(problem, "dykstra", max_iter=3)
+    assert rough.status == "inaccurate"
+    assert "3 iterations" in rough.detail
+    assert rough.residual > 0
 
 
 def test_the_page_on_adding_a_method_works():

@@ -5,6 +5,7 @@ import pytest
 
 from towline import Dynamics, Robot, load, tensions
 from towline.control import Predictive
+from towline.estimation.calibration import next_poses
 from towline.estimation.calibration.geometry import length_of
 from towline.models import points
 from towline.models.diagnosis import diagnose
@@ -56,6 +57,15 @@ def test_a_calibration_has_the_scale_of_the_cables():
     here, there = load("cogiro"), moved(load("cogiro"))
     assert length_of(here) == pytest.approx(Dynamics(here).cable_lengths(here.home).mean())
     assert length_of(there) == pytest.approx(length_of(here))
+
+
+@pytest.mark.parametrize("name", ["cogiro", "planar-4"])
+def test_the_poses_to_measure_next_move_with_the_robot(name):
+    here, there = load(name), moved(load(name))
+    poses = next_poses(here, count=4)
+    np.testing.assert_allclose(next_poses(there, count=4) - poses, np.tile([*AWAY, 0, 0, 0], (4, 1)), atol=1e-9)
+    assert np.ptp(poses[:, :3], axis=0).max() > 0.5 * length_of(here), "they are all over the robot's workspace"
+    assert 0.2 < np.abs(poses[:, 3:]).max() <= 0.3
 
 
 def test_quadrotors_elsewhere_react_as_far():

@@ -136,8 +136,9 @@ def test_every_row_of_reports_is_explained():
     runs.append(simulate(robot, plans[0], duration=0.1, mismatch={"mass": [0.9, 1.1]}, tolerance=1e-9))
     many = simulate(robot, plans[0], duration=0.1, mismatch={"mass": [0.9, 1.1]}, tolerance=1e-9, runs=2)
     free = [{"part": "t_max", "range": {"min": 20, "max": 500}, "equal": True}]
+    lift = {"name": "lift", "path": {"kind": "line", "start": [0, 0, 2.4], "end": [0, 0, 2.6]}, "duration": 2}
     near, far = ([{"poses": [[x, 0, 2.5, 0, 0, 0]]}] for x in (0, 9))
-    designs = [design("ipanema-2", free, near, time_limit=0.2), design("ipanema-2", free, far)]
+    designs = [design("ipanema-2", free, near, time_limit=0.2, tasks=[lift]), design("ipanema-2", free, far)]
     designs.append(design("ipanema-2", free, near, time_limit=0.2, margin=1e4))
     assert [found.status for found in designs[:2]] == ["feasible", "infeasible"]
     names = {carrier.name for who in (robot, team) for carrier in who.carriers} | {""}

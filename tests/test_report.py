@@ -1,4 +1,4 @@
-"""What a plan shows a person: its report as text and HTML, its figures, its film."""
+"""What a plan shows a person: its report as text and HTML, its convergence, its film."""
 
 import shutil
 import time
@@ -9,12 +9,14 @@ from io import StringIO
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 from PIL import Image
 from rich.console import Console
 
 from towline.base.errors import InputError, TowlineError
 from towline.cli.watching import watching
 from towline.figures import animation, film
+from towline.figures.convergence import convergence, runs
 from towline.figures.style import typeset
 from towline.figures.views import views
 from towline.models import Dynamics, load
@@ -191,7 +193,7 @@ class Page(HTMLParser):
 
 
 def test_html_tells_the_same_facts_and_loads_nothing(free, impossible, tmp_path):
-    for found, pictures in ((free, 5), (impossible, 4)):
+    for found, pictures in ((free, 6), (impossible, 4)):
         file = found.save_report(tmp_path / "new" / "report.html")
         text = file.read_text()
         page = Page(text)
@@ -219,7 +221,7 @@ def test_html_tells_the_same_facts_and_loads_nothing(free, impossible, tmp_path)
         assert "url(" not in text
         assert "@import" not in text
         alternatives = [value for tag, name, value in page.attributes if name == "alt"]
-        assert ("Other limits" in alternatives) == (found is free)
+        assert ("Convergence of the solver" in alternatives) == (found is free)
         assert [path.name for path in file.parent.iterdir()] == ["report.html"]
     with pytest.raises(InputError, match="cannot be written"):
         free.save_report("/proc/nowhere/report.html")
@@ -239,9 +241,25 @@ def test_what_comes_from_files_is_escaped(impossible, tmp_path):
     assert page.text.count(evil) >= 5  # title, heading, limit exceeded, both files
 
 
+def test_convergence_shows_every_run():
+    first = [(0, 5.0, 1.0), (1, 3.0, 1e-3), (2, 2.5, 0.0)]
+    second = [(0, 2.6, 1e-2), (1, 2.4, 1e-9)]
+    assert [len(run) for run in runs([*first, *second])] == [3, 2]
+    above, below = convergence([*first, *second]).axes
+    curves = [line for line in above.get_lines() if str(line.get_label()).startswith("run")]
+    assert [list(line.get_xdata()) for line in curves] == [[0, 1, 2], [3, 4]]
+    assert len({to_hex(line.get_color()) for line in curves}) == 2
+    assert (above.get_yscale(), below.get_yscale()) == ("log", "log")
+    assert min(curves[0].get_ydata()) > 0  # or the point would not be drawn
+    np.testing.assert_array_equal(below.get_lines()[0].get_ydata(), [5.0, 3.0, 2.5])
+    assert convergence([(0, -1.0, 1.0), (1, 2.0, 0.1)]).axes[1].get_yscale() == "symlog"
+    for rows in ([], [(0, 0.0, 0.0)], [(0, float("nan"), float("inf")), (1, 1.0, 1.0)]):
+        convergence(rows).canvas.draw()
+
+
 def test_plots_of_a_plan(free, impossible, tmp_path):
     drawn = [path.name for path in free.plot(tmp_path)]
-    assert drawn == ["views.png", "tensions.png", "path.png", "base.png", "limits.png"]
+    assert drawn == ["views.png", "tensions.png", "path.png", "base.png", "limits.png", "convergence.png"]
     assert [path.name for path in impossible.plot(tmp_path)] == ["views.png", "tensions.png", "path.png", "base.png"]
 
 

@@ -388,7 +388,7 @@ def test_a_back_end_that_calls_a_feasible_problem_infeasible_is_not_believed(mon
 def test_methods_tell_about_themselves():
     listed = methods()
     assert list(listed)[:4] == ["active-set", "daqp", "qp", "min-norm"]
-    assert {"closed-form", "centroid", "log-barrier", "soft-wrench"} <= set(listed)
+    assert {"closed-form", "centroid", "dykstra", "log-barrier", "soft-wrench"} <= set(listed)
     for name, method in listed.items():
         assert method.name == name
         assert method.guarantee

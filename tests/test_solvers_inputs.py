@@ -73,7 +73,8 @@ def test_anything_is_answered_or_message_in_one_line(name, function, right):
 
 
 def test_numpys_numbers_are_numbers():
-    assert solve(PROBLEM, "soft-wrench", rho=np.float32(4)).tensions is not None
+    assert solve(PROBLEM, "p-norm", p=np.float32(4)).feasible
+    assert solve(PROBLEM, "dykstra", max_iter=np.int64(1000)).feasible
     assert solve(PROBLEM, "log-barrier", barrier=np.float16(0.5)).feasible
 
 
@@ -83,7 +84,7 @@ def test_more_than_sixteen_cables_are_no_trouble(m):
     matrix = rng.normal(size=(6, m))
     problem = TensionProblem(matrix, matrix @ rng.uniform(2, 9, m), 1.0, 10.0)
     expected = solve(problem, "daqp").tensions
-    for name in ("active-set", "qp", "min-norm", "2-norm", "soft-wrench"):
+    for name in ("active-set", "qp", "min-norm", "2-norm", "dykstra", "soft-wrench"):
         np.testing.assert_allclose(solve(problem, name).tensions, expected, rtol=0, atol=1e-6, err_msg=name)
     np.testing.assert_allclose(solve_batch(matrix, problem.w, 1.0, 10.0).tensions, expected, rtol=0, atol=1e-8)
     assert "centroid is costly" in solve(problem, "centroid").detail

@@ -22,11 +22,12 @@ REFUSALS = {
     "closed-form": "leaves the limits of cable",
     "improved-closed-form": "no redundancy left",
     "centroid": "unbounded|m - rank is [0-9]+, and a centroid is costly beyond 5",
+    "analytic-centre": "the feasible tensions are unbounded",
     "least-sum": "no limit bounds what is optimised",
     "largest-margin": "no limit bounds what is optimised",
     "min-max": "no limit bounds what is optimised",
 }
-LEAST_SQUARES = ("active-set", "daqp", "qp", "min-norm", "2-norm", "soft-wrench")
+LEAST_SQUARES = ("active-set", "daqp", "qp", "min-norm", "2-norm", "dykstra", "soft-wrench")
 SLOW = 0.05  # s; ten times what the slowest takes in the median
 
 
@@ -72,16 +73,23 @@ def optimum_is_missed_by(problem, method, t):
     size = np.abs(t).max()
     if method in LEAST_SQUARES:
         return optimality_error(problem, t)
-    if method == "log-barrier":
+    if method in ("log-barrier", "analytic-centre"):
         assert (t > problem.t_min).all()
         assert (t < problem.t_max).all()
         ranges = problem.t_max - problem.t_min
         narrowest = ranges[np.isfinite(ranges)].min(initial=np.inf)
         mu = (0.01 * (narrowest if np.isfinite(narrowest) else 1.0)) ** 2
         up, down = mu / (problem.t_max - t), mu / (t - problem.t_min)
-        square = problem.weights / problem.weights.max() * t
+        square = problem.weights / problem.weights.max() * t if method == "log-barrier" else np.zeros(m)
         null = np.linalg.svd(problem.A)[2][np.linalg.matrix_rank(problem.A) :]
         return np.abs(null @ (square + up - down)).max(initial=0.0) / (np.abs(square) + up + down).max()
+    if method == "p-norm":
+        apart = np.sqrt(problem.weights) * t
+        part = apart / np.abs(apart).max()
+        gradient = np.sqrt(problem.weights) * np.sign(part) * np.abs(part) ** 3
+        best = linear_optimum(problem, gradient)
+        # At the optimum no feasible direction goes down.
+        return (gradient @ t - best) / (np.abs(gradient) @ np.abs(t)) if best is not None else 0.0
     if method == "least-sum":
         best = linear_optimum(problem, np.ones(m))
         return abs(t.sum() - best) / (m * size)
@@ -130,15 +138,17 @@ def test_refusals_are_right():
         unbounded = any(
             linear_optimum(problem, sign * row) is None for row in np.eye(problem.m) for sign in (1.0, -1.0)
         )
+        assert (not solve(problem, "analytic-centre").feasible) is unbounded
         freedom = problem.m - np.linalg.matrix_rank(problem.A)
         assert (not solve(problem, "centroid").feasible) is bool(unbounded or freedom > 5)
         assert (not solve(problem, "least-sum").feasible) is (linear_optimum(problem, np.ones(problem.m)) is None)
 
 
-def test_the_centroid_of_a_wrench_that_may_be_missed_is_the_middle_of_the_limits():
+def test_the_centres_of_a_wrench_that_may_be_missed_are_the_middle_of_the_limits():
     for problem in make_task("soft", 4, 5).problems:
         middle = 0.5 * (problem.t_min[:4] + problem.t_max[:4])
-        np.testing.assert_allclose(solve(problem, "centroid").tensions[:4], middle, rtol=0, atol=1e-9)
+        for method in ("centroid", "analytic-centre"):
+            np.testing.assert_allclose(solve(problem, method).tensions[:4], middle, rtol=0, atol=1e-9)
 
 
 def test_a_wrench_out_of_reach_is_told_by_a_certificate_whatever_the_method_refuses():
@@ -168,3 +178,24 @@ def test_the_rounding_of_a_robot_file_does_not_choose_the_tensions(cables, lengt
             continue  # many tensions have the same sum
         tensions = solve(problem, name).tensions
         np.testing.assert_allclose(tensions, 98.1 / u[2].sum(), rtol=1e-7, err_msg=name)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_analytic_centre_with_unlimited_cables_is_stationary(seed):
+    """No step that keeps A t changes the sum of the logarithms of the distances to the limits that there are."""
+    rng = np.random.default_rng(seed)
+    m, n = int(rng.integers(7, 12)), 6
+    A = geometric_matrix(rng, m)[:n]
+    low, high = np.full(m, 1.0), np.full(m, 50.0)
+    free = rng.choice(m, size=int(rng.integers(1, 5)), replace=False)
+    low[free], high[free] = -np.inf, np.inf
+    low[np.setdiff1d(np.arange(m), free)[0]] = -np.inf  # one with an upper limit only
+    answer = solve(TensionProblem(A, A @ rng.uniform(5, 45, m), low, high), "analytic-centre")
+    if answer.tensions is None:
+        assert re.search(REFUSALS["analytic-centre"], answer.detail)
+        return
+    t = answer.tensions
+    slope = np.where(np.isfinite(low), 1 / (t - np.where(np.isfinite(low), low, 0)), 0.0)
+    slope -= np.where(np.isfinite(high), 1 / (np.where(np.isfinite(high), high, 0) - t), 0.0)
+    multipliers = np.linalg.lstsq(A.T, slope, rcond=None)[0]
+    assert np.abs(slope - A.T @ multipliers).max() < 1e-6 * max(np.abs(slope).max(), 1e-3)

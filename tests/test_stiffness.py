@@ -1,4 +1,6 @@
-"""Stiffness and natural frequencies against the plant and simulations."""
+"""Stiffness and natural frequencies against the plant and simulations, and the stiffest tensions against grids."""
+
+import time
 
 import numpy as np
 import pytest
@@ -6,10 +8,11 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
-from towline import Dynamics, simulate, tensions
+from towline import Dynamics, simulate, solve_batch, tensions
+from towline.base.errors import InputError
 from towline.control import LengthControl
 from towline.plant import Plant
-from towline.statics.stiffness import natural_frequencies
+from towline.statics.stiffness import natural_frequencies, stiffest
 
 from .framed import framed
 from .stiff_robots import elastic, inertia
@@ -85,3 +88,70 @@ def test_a_locked_platform_has_the_frequencies_of_what_is_free():
     turn = up * b**2  # the pulls on the turned arms cancel
     expected = np.sqrt([sideways / mass, up / mass, turn / turning]) / (2 * np.pi)
     assert_allclose(natural_frequencies(robot, robot.home, np.full(4, t)), np.sort(expected), rtol=1e-12)
+
+
+def problems():
+    """Yield robots with poses, 200 in total, that have tensions above 1 N."""
+    rng = np.random.default_rng(7)
+    for name, centre, half in (("ipanema-2", (0, 0, 2.75), (2, 1.5, 0.75)), ("cogiro", (0, 0, 1.75), (4, 3, 1.25))):
+        for EA in (1e3, 1e4, 1e5, 1e6):
+            robot = elastic(name, EA)
+            poses = np.zeros((60, 6))
+            poses[:, :3] = centre + np.array(half) * rng.uniform(-1, 1, (60, 3))
+            poses[:, 3:] = 0.05 * rng.normal(size=(60, 3))
+            w = Dynamics(robot).required_wrench(robot.home, np.zeros(6), np.zeros(6))
+            A = Dynamics(robot).wrench_matrix(poses)
+            feasible = np.flatnonzero(solve_batch(A, w, robot.t_min, robot.t_max).feasible)[:25]
+            assert feasible.size == 25
+            for i in feasible:
+                yield robot, poses[i], A[i], w
+
+
+def test_no_tensions_on_a_grid_are_stiffer():
+    gains, spent, count = [], [], 0
+    for robot, pose, A, w in problems():
+        before = time.process_time()
+        found = stiffest(robot, pose)
+        spent.append(time.process_time() - before)
+        t = found.solution.tensions
+        count += 1
+        assert found.solution.status == "optimal"
+        assert_allclose(A @ t, w, atol=1e-6)
+        lowest = natural_frequencies(robot, pose, t)[0]
+        assert_allclose(found.frequency, lowest, rtol=1e-9)
+        assert lowest * (1 - 1e-9) <= found.bound <= lowest * (1 + 1e-6)
+        N = np.linalg.svd(A)[2][6:]
+        corners = np.abs(robot.t_max.max() - robot.t_min.min()) * np.sqrt(8)
+        axis = np.linspace(-corners, corners, 250)
+        grid = t + np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2) @ N
+        grid = grid[((grid >= robot.t_min) & (grid <= robot.t_max)).all(axis=1)]
+        grid = grid[:: max(1, len(grid) // 400)]
+        near = t + 1e-3 * corners * np.random.default_rng(count).normal(size=(200, 2)) @ N
+        grid = np.vstack([grid, near[((near >= robot.t_min) & (near <= robot.t_max)).all(axis=1)]])
+        if len(grid):
+            assert natural_frequencies(robot, pose, grid)[:, 0].max() <= found.bound * (1 + 1e-9)
+        gains.append(lowest / natural_frequencies(robot, pose, tensions(robot, pose).tensions)[0] - 1)
+    assert count == 200
+    assert min(gains) > -1e-6
+    assert np.median(spent) < 5e-3  # about 0.9 ms, on a machine that does nothing else
+
+
+def test_what_has_no_stiffest_tensions():
+    robot = elastic("ipanema-2", 1e4)
+    far = stiffest(robot, [0, 0, 9, 0, 0, 0])
+    assert far.solution.status == "infeasible"
+    assert far.solution.certificate is not None
+    assert np.isnan(far.frequency)
+    pushed = stiffest(robot, robot.home, w=[0, 0, 150, 0, 0, 0])
+    assert_allclose(Dynamics(robot).wrench_matrix(robot.home)[:3] @ pushed.solution.tensions, [0, 0, 150], atol=1e-6)
+    for wrong, message in (
+        (lambda: stiffest("ipanema-2", robot.home), r"cables\[0\].t_min must be above 0 N"),
+        (lambda: stiffest(elastic("ipanema-2", None), robot.home), r"cables\[0\].stiffness must be E A > 0"),
+        (lambda: stiffest(robot, [0, 0]), "pose must have the shape"),
+        (lambda: stiffest(robot, np.tile(robot.home, (2, 1))), "pose must be that of one instant"),
+        (lambda: stiffest(robot, robot.home, w=[1, 2]), "w must"),
+        (lambda: stiffest(robot, robot.home, w=np.full(6, np.nan)), "w must"),
+        (lambda: natural_frequencies(robot, robot.home, [1.0]), "tensions must have the shape"),
+    ):
+        with pytest.raises(InputError, match=message):
+            wrong()

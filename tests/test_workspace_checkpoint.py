@@ -147,6 +147,14 @@ def test_what_is_there_is_not_asked_again(tmp_path):
     assert sum(counts) == 1 + CHUNK
 
 
+def test_refinement_goes_on_too(tmp_path):
+    options = {"method": "adaptive", "samples": 60_000}
+    file = tmp_path / "run.checkpoint"
+    first = save(run(file, False, **options), tmp_path / "first.nc").read_bytes()
+    lose(file, ">= 2")
+    assert save(run(file, True, **options), tmp_path / "second.nc").read_bytes() == first
+
+
 @pytest.mark.parametrize(
     ("changed", "name"),
     [

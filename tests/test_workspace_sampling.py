@@ -96,7 +96,7 @@ def test_cells_of_a_grid_are_about_cubes():
     assert cells_of(np.array([2.0, 1.0]), 1) == (1, 1)
 
 
-@pytest.mark.parametrize("method", ["random", "sobol", "grid"])
+@pytest.mark.parametrize("method", ["random", "sobol", "grid", "adaptive"])
 def test_the_prism_below_three_anchors(method):
     found = sample(hanging_mass(), REST, {"position": BOX}, 40_000, method)
     low, high = found["volume_interval"].values
@@ -104,7 +104,7 @@ def test_the_prism_below_three_anchors(method):
         assert np.isnan([low, high]).all()  # no chance, no interval
     else:
         assert low < AREA < high
-    within = {"random": 0.04, "grid": 0.02, "sobol": 0.006}[method]
+    within = {"random": 0.04, "grid": 0.02, "adaptive": 0.02, "sobol": 0.006}[method]
     assert float(found["volume"]) == pytest.approx(AREA, rel=within)
     assert found["volume"].units == "m^3"
     x, y = found["position"].values[:, :2].T
@@ -114,6 +114,19 @@ def test_the_prism_below_three_anchors(method):
     assert found["bounds"].values[0, 0] == pytest.approx(-RADIUS / 2, abs=0.08)
     assert found["tried"].sum() == found.attrs["samples"]
     assert found["reached"].sum() == found.attrs["accepted"] == found.sizes["point"]
+
+
+def test_refinement_reaches_the_size_and_covers_the_boundary():
+    found = sample(hanging_mass(), REST, {"position": BOX}, 10**6, "adaptive", size=0.04)
+    assert found["cell_edges"].max() <= 0.04
+    low, high = found["volume_interval"].values
+    assert low < AREA < high
+    # Its cells are where an edge of the triangle is, and all along it.
+    x, y = found["boundary"].values[:, :2].T
+    away = [x * np.cos(a) + y * np.sin(a) - RADIUS / 2 for a in np.array([1, 3, 5]) * np.pi / 3]
+    assert np.abs(np.max(away, axis=0)).max() < 0.04 * np.sqrt(2)
+    perimeter = 3 * np.sqrt(3) * RADIUS
+    assert (high - low) / 0.04 < 3 * perimeter
 
 
 def test_a_slice_has_an_area():
@@ -209,11 +222,15 @@ def test_fewer_processors_inside_of_a_block():
     [
         ({"samples": 0}, "samples must be a whole number from 1"),
         ({"samples": 2.5}, "got 2.5"),
-        ({"method": "dice"}, "method must be one of random, sobol, grid, got 'dice'"),
+        ({"method": "dice"}, "method must be one of random, sobol, grid, adaptive, got 'dice'"),
         ({"seed": -1}, "seed must be a whole number"),
         ({"workers": 0}, "workers must be"),
         ({"keep": "some"}, "keep must be one of accepted, all, none, got 'some'"),
         ({"resume": True}, "checkpoint must be a path if resume is True"),
+        ({"size": 0.1}, "size must be left out unless method is adaptive, got 0.1"),
+        ({"method": "adaptive", "size": -1.0}, "size must be a number from 1e-09 to 1e+09 [m], or None, got -1.0"),
+        ({"method": "adaptive", "size": "fine"}, "size must be a number"),
+        ({"method": "adaptive", "samples": 4}, "samples must be at least 8, the corners of a cell, got 4"),
         ({"region": {"position": {"min": [0, 0, 0], "max": [0, 0, 0]}}}, "region.position must have min below max"),
         ({"region": {"position": {"min": [1, 0, 0], "max": [0, 1, 1]}}}, "exceed max, 0 m along x, got 1 m"),
         ({"region": {"attitude": {"min": [0, 0, 0], "max": [0, 0, 1]}}}, "equal min and max of yaw"),
@@ -237,6 +254,8 @@ def test_fewer_processors_inside_of_a_block():
         ({"checkpoint": 5}, "checkpoint must be a path"),
         ({"resume": "yes"}, "resume must be True or False"),
         ({"progress": 1}, "progress must be a function"),
+        ({"method": "adaptive", "samples": 10**7}, "samples with method adaptive must be"),
+        ({"method": "adaptive", "size": np.nan}, "size must be a number"),
     ],
 )
 def test_wrong_input_is_one_line(arguments, message):

@@ -92,15 +92,19 @@ class Counter(Displayed):
 
     condition: Condition
     domain: Domain
-    sampler: Sampler
+    sampler: Sampler | None  # none if the points of each chunk are given
     keep: str  # samples that are kept: accepted, all or none
+    samples: int  # maximum number of samples of the run
     metrics: tuple[str, ...] = ()  # of the samples that are kept
 
-    def count(self, first: int, known: Sequence[bytes | None], keep: bool) -> tuple[Counts, list[bytes]]:
+    def count(
+        self, first: int, known: Sequence[bytes | None], points: Sequence[np.ndarray] | None, keep: bool
+    ) -> tuple[Counts, list[bytes]]:
         """Count some chunks, one after the other, with one processor.
 
         - `first`: number of the first chunk.
         - `known`: known bits of each chunk, else None.
+        - `points`: points of each chunk in the unit cube (n, d); default: the sampler's.
         - `keep`: True to keep samples, not only count them.
 
         Returns the counts, and which samples of each chunk are accepted, one bit per sample.
@@ -108,7 +112,11 @@ class Counter(Displayed):
         counts, flags = Counts(self.domain), []
         with processors.at_most(1):
             for offset, bits in enumerate(known):
-                units = self.sampler.units(first + offset)
+                if points is not None:
+                    units = points[offset]
+                else:
+                    assert self.sampler is not None
+                    units = self.sampler.units(first + offset)
                 places, exists = self.domain.places(units)
                 if bits is None:
                     held = np.asarray(self.condition.holds(self.domain.robot, places), dtype=bool) & exists

@@ -1,4 +1,4 @@
-"""The dataset of a run (counts, samples and volume with names and units), and its files."""
+"""The dataset of a run (counts, samples, volume and boundary with names and units), and its files."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from ..base.writing import whole_folder
 from .counts import Counts
 from .domain import Domain
 from .metrics import METRICS
+from .refinement import Refinement
 from .sampling import CHUNK
 from .volume import LEVEL, share_interval
 
@@ -26,7 +27,9 @@ METRES = {"units": "m"}
 OF_THIS_RUN = ("seconds", "poses_per_s", "workers")  # left out of files, which are equal whatever computed them
 
 
-def dataset(counts: Counts, domain: Domain, keep: str, method: str, metrics: tuple[str, ...]) -> xr.Dataset:
+def dataset(
+    counts: Counts, domain: Domain, keep: str, method: str, refinement: Refinement | None, metrics: tuple[str, ...]
+) -> xr.Dataset:
     """Return the results of a run as a dataset, which `sample` documents."""
     import xarray as xr
 
@@ -35,7 +38,7 @@ def dataset(counts: Counts, domain: Domain, keep: str, method: str, metrics: tup
         "bounds": (("end", "axis"), bounds, METRES),
         "tried": (("x", "y", "z"), counts.cells[0], {"units": "1", "long_name": "samples tried in the cell"}),
         "reached": (("x", "y", "z"), counts.cells[1], {"units": "1", "long_name": "samples accepted in the cell"}),
-        **_volume(counts, domain, method),
+        **_volume(counts, domain, method, refinement),
     }
     coordinates: dict[str, Any] = {"axis": ["x", "y", "z"], "end": ["min", "max"]}
     for name, low, high, count in zip("xyz", *domain.box, counts.cells.shape[1:], strict=True):
@@ -45,6 +48,8 @@ def dataset(counts: Counts, domain: Domain, keep: str, method: str, metrics: tup
         coordinates |= {"angle": ["roll", "pitch", "yaw"]} if domain.attitude_varies else {}
         names = [carrier.name for carrier in domain.robot.carriers]
         coordinates |= {"carrier": names} if domain.carriers_vary else {}
+    if refinement is not None:
+        variables |= _boundary(domain, refinement)
     return xr.Dataset(variables, coordinates)
 
 
@@ -94,10 +99,26 @@ def _kept(counts: Counts, domain: Domain, keep: str, metrics: tuple[str, ...]) -
     return kept
 
 
-def _volume(counts: Counts, domain: Domain, method: str) -> dict[str, Any]:
+def _boundary(domain: Domain, refinement: Refinement) -> dict[str, Any]:
+    corners, _ = domain.places(refinement.cells)
+    upper, _ = domain.places(refinement.cells + refinement.edges)
+    edges = np.zeros(len(domain.low))
+    edges[domain.varying] = domain.extent * refinement.edges
+    about = {"units": "m", "long_name": "centres of the smallest cells, through which the boundary passes"}
+    return {
+        "boundary": (("cell", "axis"), (corners.pose[:, :3] + upper.pose[:, :3]) / 2, about),
+        "cell_edges": (("axis",), edges[:3], {"units": "m", "long_name": "edges of the smallest cells"}),
+    }
+
+
+def _volume(counts: Counts, domain: Domain, method: str, refinement: Refinement | None) -> dict[str, Any]:
     """Return the volume and its interval."""
     ends = np.nan, np.nan
-    if domain.position_from_lengths:
+    if refinement is not None:
+        ends = refinement.inside, refinement.inside + refinement.mixed
+        value = refinement.estimate
+        about = "lower and upper bound, if the first, coarse grid misses no part of the workspace"
+    elif domain.position_from_lengths:
         value = np.count_nonzero(counts.cells[1]) / counts.cells[1].size
         about = "no interval: positions are not uniform; this is the volume of the cells reached"
     else:

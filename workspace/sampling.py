@@ -15,7 +15,7 @@ from ..base.display import Displayed
 from ..base.inputs import one_of, whole_number
 
 CHUNK = 16_384  # a power of two, as Sobol's sequence likes; about 15 ms of work
-METHODS = ("random", "sobol", "grid")
+METHODS = ("random", "sobol", "grid", "adaptive")
 MOST = 10**12  # samples
 MOST_SOBOL = 2**32
 

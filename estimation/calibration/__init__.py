@@ -5,6 +5,7 @@ from ..logs.reading import read_measurements
 from .calibration import Calibration
 from .correction import corrected
 from .cross_validation import Compared, HeldOut
+from .design import next_poses
 from .outliers import Outlier, Slip
 from .plausibility import Mistake, mistake
 from .result import Parameter
@@ -23,5 +24,6 @@ __all__ = [
     "calibrate",
     "corrected",
     "mistake",
+    "next_poses",
     "read_measurements",
 ]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...figures import plan as plan_figures
+from ...figures.convergence import convergence
 from ...figures.drawing import Drawing
 from ...figures.limits import limits
 from ...figures.phase_plane import phase_plane
@@ -41,6 +42,8 @@ def drawings(plan: PlanData, trajectory: xr.Dataset) -> dict[str, Drawing]:
     quantities = limited(plan, rows)
     if any(each.used() is not None for each in quantities):
         drawn["limits"] = Drawing("Other limits", limits(plan.audit.times[rows], quantities))
+    if plan.iterates:
+        drawn["convergence"] = Drawing("Convergence of the solver", convergence(plan.iterates))
     return drawn
 
 

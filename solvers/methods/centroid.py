@@ -37,7 +37,7 @@ class Centroid(Method):
         """Take the centroid of the corners in the null space."""
         freedom = form.N.shape[0]
         if freedom > _MOST:
-            detail = f"m - rank is {freedom}, and a centroid is costly beyond {_MOST}; largest-margin takes any"
+            detail = f"m - rank is {freedom}, and a centroid is costly beyond {_MOST}; analytic-centre takes any"
             return Proposal(None, detail=detail, final=True)
         points = corners(form)
         if points is None:

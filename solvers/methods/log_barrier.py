@@ -48,8 +48,12 @@ class LogBarrier(Method):
         # Taken from the limits alone: with anything that depends on w the tensions would not be smooth in it.
         narrowest = float(ranges[np.isfinite(ranges)].min(initial=np.inf))
         root = barrier * (narrowest if np.isfinite(narrowest) else 1.0) / form.unit.min(initial=np.inf)
-        start = options.get("start")
-        if start is not None:
-            t = finite_array("start", start, form.origin.shape)
-            start = (t[form.moving] - form.origin[form.moving]) / form.unit
-        return barrier_point(form, root**2, start)
+        return barrier_point(form, 1.0, root**2, start_in_form(form, options.get("start")))
+
+
+def start_in_form(form: StandardForm, start: Any) -> Any:
+    """Return the tensions to start from as a point s, shape (k,), or None if there are none."""
+    if start is None:
+        return None
+    t = finite_array("start", start, form.origin.shape)
+    return (t[form.moving] - form.origin[form.moving]) / form.unit

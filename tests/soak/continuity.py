@@ -32,7 +32,7 @@ SIZES = ((7, 6), (8, 6), (9, 6), (3, 3), (4, 3), (5, 3), (6, 3))  # cables, rank
 JUMP = 0.05
 
 METHODS = tuple(name for name, method in methods().items() if method.continuous or method.always_answers)
-SMOOTH: dict[str, dict[str, Any]] = {"log-barrier": {"barrier": 0.05}}
+SMOOTH: dict[str, dict[str, Any]] = {"log-barrier": {"barrier": 0.05}, "analytic-centre": {}}
 
 # Steps of the differences that stand for the derivative, and how often the interval may be halved until it is no longer
 # than they are. The finer ones are for steep derivatives: a kink is a kink with all of them.

@@ -1,7 +1,7 @@
 r"""Newton's method for a point inside the limits: least of a square and logarithms of the distances to the limits.
 
 $$
-\min_s \; \frac12 |s|^2 - \mu \sum_i \big( \log (s_i - lower_i) + \log (upper_i - s_i) \big)
+\min_s \; \frac{c}{2} |s|^2 - \mu \sum_i \big( \log (s_i - lower_i) + \log (upper_i - s_i) \big)
 \quad \text{s.t.} \quad Q s = b
 $$
 
@@ -47,18 +47,19 @@ _NO_SPACE = 1e-13
 _FAR = 1e9
 
 
-def barrier_point(form: StandardForm, mu: float, start: Array | None) -> Proposal:
+def barrier_point(form: StandardForm, square: float, mu: float, start: Array | None) -> Proposal:
     """Find the minimiser.
 
     - `form`: the problem.
+    - `square`: c, 0 or 1. With 0 the feasible tensions must be bounded.
     - `mu`: weight of the logarithms.
     - `start`: where to begin, shape (k,), anywhere; None = in the middle of the limits.
     """
     if not form.lower.size:
         return Proposal(np.zeros(0))
-    near, used = _primal_dual(form, mu, _pulled_inside(form, start), warm=start is not None)
+    near, used = _primal_dual(form, square, mu, _pulled_inside(form, start), warm=start is not None)
     if near is not None:
-        point, more = _damped(form, mu, near)
+        point, more = _damped(form, square, mu, near)
         used += more
         if point is not None:
             return Proposal(point, used)
@@ -66,7 +67,9 @@ def barrier_point(form: StandardForm, mu: float, start: Array | None) -> Proposa
     inner, share = deepest(form, np.minimum(form.upper - form.lower, 1.0), most=0.5)
     if inner.s is None or share <= 1e-9:
         return Proposal(None, used, "the feasible tensions have no interior")
-    point, more = _damped(form, mu, inner.s)
+    point, more = _damped(form, square, mu, inner.s)
+    if point is None and square == 0.0:
+        return Proposal(None, used + more, "the feasible tensions are unbounded: no centre", final=True)
     return Proposal(point, used + more, "" if point is not None else f"not converged in {_DAMPED_STEPS} Newton steps")
 
 
@@ -103,15 +106,15 @@ class _Iterate(NamedTuple):
     at_upper: Array
 
 
-def _primal_dual(form: StandardForm, mu: float, s: Array, warm: bool) -> tuple[Array | None, int]:
+def _primal_dual(form: StandardForm, square: float, mu: float, s: Array, warm: bool) -> tuple[Array | None, int]:
     """Return a point inside the limits and on Q s = b near the minimiser, or None if it does not come near."""
     below, above = s - form.lower, form.upper - s
     limits = int(np.isfinite(below).sum() + np.isfinite(above).sum())
     # Cold, distances and multipliers are taken as those of a much larger mu, from which it falls step by step.
-    product = mu if warm or not limits else max(mu, float(np.abs(s).max()) ** 2, 1e-2)
+    product = mu if warm or not limits else max(mu, square * float(np.abs(s).max()) ** 2, 1e-2)
     iterate = _Iterate(s, product / below, product / above)
     for iteration in range(_STEPS):
-        iterate = _primal_dual_step(form, max(mu, _REDUCTION * product), iterate)
+        iterate = _primal_dual_step(form, square, max(mu, _REDUCTION * product), iterate)
         below, above = iterate.s - form.lower, form.upper - iterate.s
         space = min(float(below.min(initial=np.inf)), float(above.min(initial=np.inf)))
         if not (np.abs(iterate.s).max(initial=0.0) < _FAR and space > _NO_SPACE):
@@ -126,14 +129,14 @@ def _primal_dual(form: StandardForm, mu: float, s: Array, warm: bool) -> tuple[A
     return None, _STEPS
 
 
-def _primal_dual_step(form: StandardForm, target: float, iterate: _Iterate) -> _Iterate:
+def _primal_dual_step(form: StandardForm, square: float, target: float, iterate: _Iterate) -> _Iterate:
     """Take a step towards Q s = b and products of distance and multiplier that are `target`."""
     s, at_lower, at_upper = iterate
     below, above = s - form.lower, form.upper - s
-    gradient = s - target / below + target / above
+    gradient = square * s - target / below + target / above
     with np.errstate(invalid="ignore"):
         curve_low, curve_high = np.nan_to_num(at_lower / below), np.nan_to_num(at_upper / above)
-    step = _newton_step(form, gradient, 1.0 + curve_low + curve_high, form.b - form.Q @ s)
+    step = _newton_step(form, gradient, square + curve_low + curve_high, form.b - form.Q @ s)
     change_low = target / below - at_lower - curve_low * step
     change_high = target / above - at_upper + curve_high * step
     length = min(1.0, _FRACTION * min(_way_to_limits(form, s, step), _way_to_zero(at_lower, change_low)))
@@ -141,12 +144,12 @@ def _primal_dual_step(form: StandardForm, target: float, iterate: _Iterate) -> _
     return _Iterate(s + length * step, at_lower + length * change_low, at_upper + length * change_high)
 
 
-def _damped(form: StandardForm, mu: float, s: Array) -> tuple[Array | None, int]:
+def _damped(form: StandardForm, square: float, mu: float, s: Array) -> tuple[Array | None, int]:
     """Take Newton steps from a point inside that gives w: always downhill, never outside."""
     last = np.inf
     for iteration in range(_DAMPED_STEPS):
         below, above = 1.0 / (s - form.lower), 1.0 / (form.upper - s)
-        gradient, hessian = s + mu * (above - below), 1.0 + mu * (above**2 + below**2)
+        gradient, hessian = square * s + mu * (above - below), square + mu * (above**2 + below**2)
         step = _newton_step(form, gradient, hessian, form.b - form.Q @ s)
         decrement = float(np.sqrt(step @ (hessian * step) / mu))
         if decrement**2 <= _CONVERGED or last <= decrement < _ROUNDING:
@@ -158,21 +161,21 @@ def _damped(form: StandardForm, mu: float, s: Array) -> tuple[Array | None, int]
         length = min(1.0, _FRACTION * _way_to_limits(form, s, step))
         if decrement > 0.25:
             # 1 / (1 + decrement) always lowers the function; often much more does.
-            now = _value(form, mu, s)
+            now = _value(form, square, mu, s)
             while (
                 length > 1.0 / (1.0 + decrement)
-                and _value(form, mu, s + length * step) > now - 0.1 * length * decrement**2 * mu
+                and _value(form, square, mu, s + length * step) > now - 0.1 * length * decrement**2 * mu
             ):
                 length *= 0.5
         s = s + length * step
     return None, _DAMPED_STEPS
 
 
-def _value(form: StandardForm, mu: float, s: Array) -> float:
+def _value(form: StandardForm, square: float, mu: float, s: Array) -> float:
     """Return the function that is minimised, but for a constant."""
     distances = np.concatenate([s - form.lower, form.upper - s])
     with np.errstate(divide="ignore"):  # infinite where rounding puts a point on a limit
-        return 0.5 * float(s @ s) - mu * float(np.log(distances[np.isfinite(distances)]).sum())
+        return 0.5 * square * float(s @ s) - mu * float(np.log(distances[np.isfinite(distances)]).sum())
 
 
 def _way_to_zero(values: Array, change: Array) -> float:
