@@ -35,7 +35,7 @@ def _dynamics_of(robot: Robot) -> Dynamics:
 
 
 class Dynamics(Displayed):
-    """Compute the kinematics and dynamics of one robot, for arrays and CasADi expressions.
+    """Kinematics and dynamics of one robot, for arrays and CasADi expressions.
 
     Everything is in {G}; `relative` has the form of paper F (docs/theory.md), in the frame {A} of a single carrier.
     Arrays may have leading batch dimensions, which broadcast. If `pose` is a CasADi SX or MX, the result is one too.

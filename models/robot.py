@@ -234,7 +234,7 @@ class Robot(Part):
 
     @property
     def encoders(self) -> np.ndarray:
-        """Return offset [m], scale and build-up [1/m] of each cable's encoder, (m, 3); readings without are lengths."""
+        """Return offset [m], scale, build-up [1/m] of each cable's encoder, (m, 3); default: readings are lengths."""
         of = [cable.encoder or Encoder() for cable in self.cables]
         return np.array([(one.offset, one.scale, one.build_up) for one in of])  # (m, 3)
 

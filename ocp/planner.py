@@ -79,7 +79,7 @@ def plan(
 
 
 class Planner(Displayed):
-    """Plan a task repeatedly, reusing programs and the last solution.
+    """Planner of one task, which reuses its programs and the last solution.
 
     Args:
         robot: As for `plan`.

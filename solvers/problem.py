@@ -22,7 +22,7 @@ _NO_ENTRY = 1e-6  # Entries of a null-space vector below this have no sign of th
 
 @dataclass(frozen=True, eq=False)
 class TensionProblem(Displayed):
-    r"""Find tensions inside their limits that give a wrench, as close as possible to reference tensions.
+    r"""The problem: tensions inside their limits that give a wrench, as close as possible to reference tensions.
 
     $$
     \min\limits_t \; \sum_i \omega_i (t_i - t_{\text{ref},i})^2

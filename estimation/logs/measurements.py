@@ -50,7 +50,7 @@ class Sigma(NamedTuple):
 
 
 class Measurements(Displayed):
-    """Store N samples of a robot's cable lengths, with poses, tensions and times if they were measured.
+    """N samples of a robot's cable lengths, with poses, tensions and times if they were measured.
 
     Args:
         lengths: Readings of the lengths [m], (N, m): the lengths from anchor to attachment up to offset and scale.
