@@ -1,4 +1,4 @@
-"""The wheel of the sources: compiling the core takes half a minute, so it is done once for all tests."""
+"""The wheel of the sources: compiling the core takes half a minute, so that is done once, by `make setup` or here."""
 
 import os
 import re
@@ -102,6 +102,15 @@ def warned():
     return {"CFLAGS": " ".join(WARNINGS)} if re.search("gcc|clang|cc", command) and has_compiler() else {}
 
 
+def compiled_before():
+    """Return the core that `make setup` has compiled, with all warnings, from the sources as they are; None without."""
+    core, kind = ROOT / "core", f"lib.{sysconfig.get_platform()}-{sys.implementation.cache_tag}"
+    compiled = next(ROOT.glob(f"build/{kind}/towline/core/_core.*[od]"), None)
+    sources = [ROOT / "setup.py", *core.glob("packaging/*.py"), *core.rglob("*.[ch]")]
+    newest = max(each.stat().st_mtime for each in sources)
+    return compiled if compiled is not None and compiled.stat().st_mtime > newest else None
+
+
 def built_sources(factory):
     """Return the folder of sources, those of the sdist in a clone, in which a wheel was built, in dist/."""
     require_setuptools()
@@ -109,10 +118,14 @@ def built_sources(factory):
         pytest.skip("there is no C compiler; to run this: pip install ziglang")
 
     def make(folder):
+        sources, compiled = folder / "sources", compiled_before()
         if tracked_files() is None:
-            shutil.copytree(ROOT, folder / "sources", ignore=LEFT_OUT)
+            shutil.copytree(ROOT, sources, ignore=LEFT_OUT)
         else:
-            shutil.copytree(unpacked_sdist(factory), folder / "sources")
-        build("wheel", folder / "sources", **warned())
+            shutil.copytree(unpacked_sdist(factory), sources)
+        if compiled is not None:
+            (sources / compiled.parent.relative_to(ROOT)).mkdir(parents=True)
+            shutil.copy(compiled, sources / compiled.relative_to(ROOT))  # newer than the sources, so it is taken
+        build("wheel", sources, **warned())
 
     return made_once(factory, "wheel", make) / "sources"
