@@ -194,6 +194,8 @@ def test_an_interrupt_between_two_searches_keeps_the_best(monkeypatch):
 
     its = growth._largest
     monkeypatch.setattr(growth, "_largest", largest)
+    monkeypatch.setattr(growth, "_ROUNDS", 200)  # of which the first is short, however busy the processor is
+    monkeypatch.setattr(search, "AUDITED", 5_000)
     found = design(ROBOT, POINTS, REQUIRE, maximise="volume", margin=10.0, time_limit=60.0)
     assert found.stopped
     assert found.feasible

@@ -23,6 +23,7 @@ import towline
 from towline import Requirements, Robot, Task
 from towline.cli.main import app
 from towline.estimation.logs.mapping import LogMap
+from towline.layout import search
 from towline.models import carriers
 from towline.models.parsing import json_schema, parse_yaml
 
@@ -90,6 +91,7 @@ def run_page(page, folder, monkeypatch):
     """Run the blocks of a page in a folder; return the names that its Python defined."""
     monkeypatch.chdir(folder)
     monkeypatch.setenv("CFLAGS", "-O0")  # of exported units: it changes no bit
+    monkeypatch.setattr(search, "AUDITED", 10_000)  # of larger audits, test_design.py has tests
     monkeypatch.setattr(carriers, "_KINDS", dict(carriers._KINDS))  # other tests know nothing of a page's own carrier
     namespace = {"__name__": "example"}
     for block in blocks(page):
