@@ -14,6 +14,7 @@ import numpy as np
 from ..base.text import numbered
 from . import style
 from .end_labels import name_at_the_end, together
+from .plan import draw_limits
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -60,7 +61,6 @@ def tensions(trajectory: xr.Dataset) -> style.Figure:
     canvas = style.figure(height=3.1)
     ax = style.axes(canvas, "time [s]", "tension [N]")
     time, real, commanded = (trajectory[name].values for name in ("time", "tensions", "tensions_commanded"))
-    t_min, t_max = trajectory["t_min"].values, trajectory["t_max"].values
     gone = trajectory["cut"].values > 0 if "cut" in trajectory else np.zeros(real.shape, dtype=bool)
     low, high = float(np.nanmin([real, commanded])), float(np.nanmax([real, commanded]))
     differs = (np.abs(real - commanded) > DIFFERENCE * max(high - low, 1e-9)) & ~gone
@@ -71,21 +71,12 @@ def tensions(trajectory: xr.Dataset) -> style.Figure:
     ax.plot([], [], color="#444444", linewidth=1.5, label="real" if differs.any() else "real, and as commanded")
     if differs.any():
         ax.plot([], [], color="#444444", linewidth=0.6, label="commanded, where it differs")
-    slack = (real <= 0) & (t_min > 0) & ~gone
+    slack = (real <= 0) & (trajectory["t_min"].values > 0) & ~gone
     if slack.any():
         for start, stop in _spans(time, np.asarray(slack.any(axis=1))):
             ax.axvspan(start, stop, color=GREY, linewidth=1.0, zorder=0)
         ax.fill_between([], [], color=GREY, label=f"slack: {numbered('cable', np.flatnonzero(slack.any(axis=0)))}")
-    reach = max(high - low, 0.3 * max(abs(low), abs(high)))  # limits farther away than this would flatten the curves
-    limits = [("t_min", float(limit)) for limit in np.unique(t_min)]
-    limits += [("t_max", float(limit)) for limit in np.unique(t_max)]
-    near = [limit for limit in limits if low - reach <= limit[1] <= high + reach]
-    low, high = min([low, *(limit for _, limit in near)]), max([high, *(limit for _, limit in near)])
-    ax.set_ylim(low - 0.1 * (high - low), high + 0.1 * (high - low))
-    for name, limit in near:
-        style.limit_line(ax, limit, f"{name} = {limit:g} N", place=0.01, above=name == "t_max")
-    if far := [f"{name} = {limit:g} N" for name, limit in limits if (name, limit) not in near]:
-        style.far_limit(ax, f"{', '.join(far)}, outside the plot")
+    draw_limits(ax, trajectory, np.nan_to_num(real))
     ax.set_xlim(time[0], _end(time))
     left = ~gone[-1]
     names = [str(cable) for cable in trajectory["cable"].values[left]]

@@ -110,7 +110,7 @@ def _draw_tensions(ax: style.Axes, trajectory: xr.Dataset) -> None:
         shortfall = quantity(float(np.nanmax(trajectory["violation"].values)), "N", digits=3)
         label = f"no tensions inside the limits:\nshortfall up to {shortfall}; thin\nlines: tensions without limits"
         ax.fill_between(time, 0, 1, missing, transform=ax.get_xaxis_transform(), label=label, **MISSING)
-    _draw_limits(ax, trajectory, np.where(np.isfinite(values), values, unlimited))
+    draw_limits(ax, trajectory, np.where(np.isfinite(values), values, unlimited))
 
 
 def _name_cables(ax: style.Axes, trajectory: xr.Dataset) -> None:
@@ -147,7 +147,7 @@ def _free_end(values: np.ndarray, limit: float) -> float:
     return 0.0 if first > last else 1.0
 
 
-def _draw_limits(ax: style.Axes, trajectory: xr.Dataset, shown: np.ndarray) -> None:
+def draw_limits(ax: style.Axes, trajectory: xr.Dataset, shown: np.ndarray) -> None:
     """Draw the limits; upper ones too far away to draw without flattening the curves are in the legend."""
     for low in np.unique(trajectory["t_min"].values):
         style.limit_line(ax, low, f"t_min = {low:g} N", _free_end(shown, low))

@@ -89,7 +89,7 @@ def test_tensions_show_slack_limits_and_commands_that_differ():
     shown = {text.get_text() for text in axes.texts}
     assert {"t_min = 1 N", "t_max = 30 N", "cable 1", "2"} <= shown
     labels = [text.get_text() for text in axes.figure.legends[0].get_texts()]
-    assert labels == ["real", "commanded, where it differs", "slack: cable 2", "t_max = 500 N, outside the plot"]
+    assert labels == ["real", "commanded, where it differs", "slack: cable 2", "t_max = 500 N,\nabove the plot"]
     (shaded,) = axes.patches
     assert shaded.get_extents().transformed(axes.transData.inverted()).intervalx == pytest.approx([0.5, 1.0])
 

@@ -130,12 +130,12 @@ def shortfall(instant: Snapshot) -> str:
 
 def legend(subject: Subject, cell: float) -> str:
     """Return the meaning of colours and marks that can occur, as HTML; `cell` is the edge of the grid's cells [m]."""
-    robot, motions = subject.robot, [it for it in (subject.replay, subject.other) if it]
-    missing = not motions or any(np.isnan(motion.tensions).any() for motion in motions)
+    robot, shown = subject.robot, [motion for motion in (subject.replay, subject.other) if motion]
+    missing = not shown or any(np.isnan(motion.tensions).any() for motion in shown)
     bar = _gradient(_limit("t_min", robot.t_min), _limit("t_max", robot.t_max))
     marks = [("platform", style.colour(4))]
     marks += [("no feasible tensions", NO_TENSION)] if missing else []
-    marks += [("cable that has been cut", NO_TENSION)] if any("cut" in it.dataset for it in motions) else []
+    marks += [("cable that has been cut", NO_TENSION)] if any("cut" in it.dataset for it in shown) else []
     marks += [("post below an anchor", PART)] if not all(carrier.moves for carrier in robot.carriers) else []
     marks += [("pulley (its sheave)", BLACK)] if robot.pulley_radii.any() else []
     marks += [("quadrotor (arms and rotors)", BLACK)] if any(c.drawing.rotors for c in robot.carriers) else []

@@ -74,13 +74,11 @@ def near_home(scenario: Scenario) -> Change | None:
 
     def about_home(share: float) -> Variation:
         smaller = shrunk(path, home, share)
-        points = {name: getattr(smaller, name) for name in POINT if hasattr(smaller, name)}
-        points |= {f"points[{i}]": point for i, point in enumerate(getattr(smaller, "points", ()))}
-        points = points if len(points) <= MOST_NAMED else {"home": home.tolist()}
-        shown = {name: [a + 0.0 for a in point[: 6 if any(point[3:]) else 3]] for name, point in points.items()}
-        given = [f"{name} [{quantity_row(point, digits=6)}]" for name, point in shown.items()]  # to be copied
-        given += [f"radius {quantity(smaller.radius, 'm', 6)}"] if isinstance(smaller, CirclePath) else []
-        return along(scenario, smaller), 100 * share, f"of it, shrunk towards home: {', '.join(given)}"
+        ends = [(f"{name} ", getattr(smaller, name)) for name in POINT if hasattr(smaller, name)]
+        points = ends or [("", point) for point in smaller.points]
+        named = ", ".join(f"{name}({quantity_row(point[:3], digits=6)})" for name, point in points[:MOST_NAMED])
+        named += ", ..." * (len(points) > MOST_NAMED)
+        return along(scenario, smaller), 100 * share, f"of it, shrunk towards home: {named} m"
 
     return Change("size of the path", "%", about_home, least=LEAST)
 
