@@ -8,7 +8,7 @@ pitch, yaw) with R = Rz(yaw) Ry(pitch) Rx(roll).
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
@@ -355,15 +355,24 @@ def check_pulleys(offsets: np.ndarray, axes: np.ndarray, radii: np.ndarray, cabl
         )
 
 
-def usual_drive(carriers: Iterable[Carrier], cables: Iterable[Cable]) -> Drive:
+def usual_drive(carriers: Iterable[Carrier], cables: Sequence[Cable]) -> Drive:
     """Return the drive of a robot whose file has none, from its cables and the carriers that hold these.
 
     Cables keep their lengths if all hang from carriers that move them about, such as quadrotors, and none has a winch,
-    or an encoder or a pulley, which belong to one. All others have winches.
+    or an encoder or a pulley, which belong to one. All others have winches. Raises `ValueError` if one of these has a
+    length to keep.
     """
     towed = all(carrier.tows for carrier in carriers)
     winches = any(part is not None for cable in cables for part in (cable.winch, cable.encoder, cable.pulley))
-    return "fixed-length" if towed and not winches else "both"
+    if towed and not winches:
+        return "fixed-length"
+    for index, cable in enumerate(cables):
+        if cable.length is not None:
+            raise ValueError(
+                f"drive must be given, because cables[{index}] has a length ({cable.length:g} m), which cables keep "
+                "only with fixed-length"
+            )
+    return "both"
 
 
 def lengths_to_keep(cables: tuple[Cable, ...], at_home: np.ndarray) -> tuple[Cable, ...]:

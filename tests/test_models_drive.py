@@ -79,6 +79,12 @@ def test_a_cable_without_a_length_keeps_that_at_home():
         beam(QUAD, cable={"pulley": {"radius": 0.02, "axis": [1, 0, 0]}}, drive="fixed-length")
 
 
+def test_a_length_that_no_cable_would_keep_is_refused():
+    with pytest.raises(InputError, match=r"drive must be given, because cables\[0\] has a length \(1\.7 m\)"):
+        beam(QUAD, GROUND, cable={"length": 1.7})
+    assert beam(QUAD, GROUND, cable={"length": 1.7}, drive="both").fixed_lengths is None
+
+
 def test_robots_of_the_library_keep_their_drive():
     fixed = ["flycrane", "multi-quadrotor-3", "multi-quadrotor-4", "multi-quadrotor-6"]
     assert all(load(name).drive == "fixed-length" for name in fixed)
