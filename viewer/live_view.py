@@ -69,5 +69,5 @@ class Live:
         threading.Thread(target=go, daemon=True).start()
 
     def close(self) -> None:
-        """Stop playing and shading."""
+        """Stop playing."""
         self._panel.close()
