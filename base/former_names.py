@@ -12,22 +12,15 @@ PACKAGE = __name__.split(".")[0]
 NOW = {
     "calibration": "estimation.calibration",
     "distribution": "statics.distribution",
-    "embedded": "export.step",
     "errors": "base.errors",
-    "models.forward_kinematics": "estimation.pose",
     "models.mjcf": "export.mjcf",
-    "models.plant": "plant",
     "models.ranges": "models.part",
     "models.statics": "statics.equilibria",
-    "robust": "statics.robust",
-    "solvers.core": "core",
 }
 # Where each name is now, and its new name if it was renamed: the old one goes with the next release.
 MOVED: dict[tuple[str | None, str], tuple[str, str | None]] = {
-    (None, "Flight"): ("simulation", "Simulation"),
     (None, "Timing"): ("ocp", "Plan"),
     ("ocp", "Timing"): ("ocp", "Plan"),
-    ("simulation", "Flight"): ("simulation", "Simulation"),
     ("models", "PoseEstimate"): ("estimation", None),
     ("models", "branches"): ("estimation", None),
     ("models", "pose_from_lengths"): ("estimation", None),

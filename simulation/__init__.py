@@ -1,9 +1,6 @@
 """Closed-loop simulation of a plan with wind, sensor noise, faults and a controller: `simulate`."""
 
-from typing import TYPE_CHECKING, Any
-
 from ..base.execution import Execution
-from ..base.former_names import moved_name
 from ..control.noise import Noise
 from .conditions import Conditions
 from .events import Carry, Cut, Event, Follow, Lose, Miss, Push, Stick, StopReference, Wall
@@ -34,10 +31,3 @@ __all__ = [
     "simulate",
     "simulation_of",
 ]
-
-
-if not TYPE_CHECKING:  # a type checker would accept any name
-
-    def __getattr__(name: str) -> Any:
-        """Return the object of a former name."""
-        return moved_name("simulation", name)

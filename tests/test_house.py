@@ -132,8 +132,6 @@ def test_former_names_can_be_imported():
         importlib.import_module("towline.embedding")
     import towline
 
-    with pytest.warns(DeprecationWarning, match=r"towline\.models\.plant\.plant is called towline\.plant\.plant now"):
-        assert importlib.import_module("towline.models.plant.plant").Plant is towline.plant.Plant
     assert importlib.import_module("towline.calibration.solving") is towline.estimation.calibration.solving
     (ROOT / "calibration").mkdir()  # as `git pull` leaves one with the compiled modules of before
     try:
@@ -142,9 +140,6 @@ def test_former_names_can_be_imported():
         assert importlib.import_module("towline.calibration") is towline.estimation.calibration
     finally:
         (ROOT / "calibration").rmdir()
-    for package in (towline, towline.simulation):
-        with pytest.warns(DeprecationWarning, match="Flight is called Simulation now"):
-            assert package.Flight is towline.Simulation
     for package in (towline, towline.ocp):
         with pytest.warns(DeprecationWarning, match="Timing is called Plan now"):
             assert package.Timing is towline.Plan
