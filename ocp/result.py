@@ -20,6 +20,7 @@ from .tasks.deviation import Deviation
 from .tasks.paths import Motion
 from .tasks.scenario import Scenario
 from .tasks.status import MotionStatus
+from .warnings.fixed_cables import fixed_cables
 from .warnings.inside_bodies import between_points, into_each_other, into_places
 from .warnings.instants import Instants
 from .warnings.long_turns import long_turns
@@ -200,7 +201,8 @@ class PlanData(Displayed):
         limited = [values[some] for values in audit.limited]
         inside = into_places(seen, scenario.limits.all, limited)
         inside += between_points(seen, scenario.limits.all, limited)
-        others = (*outside_frame(seen), *short_cables(seen), *into_each_other(seen))
+        others = (*outside_frame(seen), *short_cables(seen), *fixed_cables(seen, audit.tensions[some]))
+        others += tuple(into_each_other(seen))
         if scenario.task.base.kind == "free":
             others = (*others, *weak_formation(seen, scenario.task.objective.formation))
         units = slipped_units(scenario.robot, scenario.task)

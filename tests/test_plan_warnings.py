@@ -14,6 +14,7 @@ from towline.errors import InputError
 from towline.models import Dynamics
 from towline.ocp.tasks.paths import LinePath
 from towline.ocp.tasks.task import read_task
+from towline.ocp.warnings.fixed_cables import fixed_cables
 from towline.ocp.warnings.instants import Instants
 from towline.ocp.warnings.long_turns import long_turns
 from towline.ocp.warnings.slipped_units import slipped_units
@@ -298,3 +299,29 @@ def test_three_cables_nearly_in_one_plane_are_warned_of(out):
         )
         assert abs(np.array([float(said[k]) for k in (1, 2, 3)]) @ across) > 0.99
         assert 100 * share <= 0.01 if said[4] else float(said[5]) == pytest.approx(100 * share, rel=0.05)
+
+
+def test_fixed_lengths_share_a_load_by_their_stiffness_and_not_as_planned():
+    """Two vertical cables on one carrier, 1 m and 2 m long: of a lighter load the short one loses two thirds."""
+    cables = [
+        {"carrier": "r", "anchor": [0, 0, z], "attachment": [0, 0, 0], "t_min": 0, "t_max": 99, "stiffness": 5e3}
+        for z in (0, 1)
+    ]
+    carrier = {"name": "r", "kind": "mobile", "home": [0, 0, 1, 0, 0, 0], "reach": {"min": [-5] * 3, "max": [5] * 3}}
+    carrier |= {"speed_max": 1, "acceleration_max": 1}
+    robot = Robot.model_validate(
+        {
+            "name": "two",
+            "source": "a test",
+            "platform": {"mass": 2, "dof": ["z"], "home": [0] * 6},
+            "carriers": [carrier],
+            "cables": cables,
+            "drive": "fixed-length",
+        }
+    )
+    still = np.zeros((2, 6)), np.tile(robot.carrier_home, (2, 1, 1))
+    seen = Instants(Dynamics(robot), np.array([0.0, 1.25]), *still)
+    for lost, slack in ((8.9, False), (9.1, True)):  # of the short one, with 6 N first: 2 / 3 of that
+        found = fixed_cables(seen, np.array([[6.0, 14.0], [9.0, 11.0 - lost]]))
+        assert [text[:44] for text in found] == ["cable 1 can go slack at t = 1.250 s, where 9"] * slack
+    assert fixed_cables(seen, np.array([[6.0, 14.0], [9.0, np.nan]])) == []
