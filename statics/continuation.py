@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyint
 
 from ..models.trajectory import Motion, Trajectory
 
@@ -10,10 +11,9 @@ RESTS = 1e-4  # [m/s, rad/s], at the end of a plan
 FADED = 1.0  # time after the end of a plan in which its last accelerations fade [s]
 SHORT = 1e-3  # [s], for differences
 JERK = 20.0  # times the last acceleration and speed, divided by powers of FADED: larger jerks are noise
-# Functions on [0, 1] that begin with value, slope or curvature 1, and end with all three zero.
-FADES = [np.polynomial.Polynomial(row) for row in ([1, 0, 0, -10, 15, -6], [0, 1, 0, -6, 8, -3], [0, 0, 1, -3, 3, -1])]
-FADES[2] /= 2
-OF_ORDER = {order: [f.integ(order) if order >= 0 else f.deriv() for f in FADES] for order in range(-1, 3)}
+# Polynomials on [0, 1], a column each, that begin with value, slope or curvature 1, and end with all three zero.
+FADES = np.array([[1, 0, 0, -10, 15, -6], [0, 1, 0, -6, 8, -3], [0, 0, 0.5, -1.5, 1.5, -0.5]]).T
+OF_ORDER = {order: polyint(FADES, order) if order >= 0 else polyder(FADES) for order in range(-1, 3)}
 POSITION = np.arange(6) < 3  # coordinates of a pose
 
 
@@ -36,6 +36,8 @@ def continued(trajectory: Trajectory, together: bool) -> Trajectory:
 
     def at(times: np.ndarray) -> tuple[Motion, Motion]:
         motions, after = trajectory.at(np.minimum(times, end)), np.maximum(times - end, 0.0)
+        if not after.any():
+            return motions
         platform, carriers = ([*motion, jerk] for motion, jerk in zip(motions, jerks, strict=True))
         first = faded(platform, after, POSITION)
         if not together:
@@ -65,13 +67,13 @@ def faded(motion: Sequence[np.ndarray], after: np.ndarray, moves: np.ndarray | b
     `motion` has values and two or three derivatives. Of the coordinates in `moves` only the accelerations fade.
     """
     values, rate, *others = motion
+    share = np.minimum(after / FADED, 1.0)[:, None]
     after = after.reshape(-1, *[1] * (values.ndim - 1))
-    share = np.minimum(after / FADED, 1.0)
 
     def fading(parts: Sequence[np.ndarray], order: int) -> np.ndarray:
         """Return the integral of order -1 to 2 of a function that fades from the derivatives `parts`."""
-        those = zip(OF_ORDER[order], parts, strict=False)
-        return np.asarray(sum(FADED ** (k + order) * f(share) * part for k, (f, part) in enumerate(those)))
+        shapes = (share ** np.arange(6 + order) @ OF_ORDER[order]).T.reshape(-1, *after.shape)
+        return np.asarray(sum(FADED ** (k + order) * shapes[k] * part for k, part in enumerate(parts)))
 
     faster = fading(others, 1)
     on = values + after * rate + fading(others, 2) + np.maximum(after - FADED, 0.0) * faster

@@ -27,8 +27,9 @@ from ..models.robot import Robot
 from ..models.trajectory import Motion, Trajectory
 from .continuation import RESTS, before, continued, faded, slopes
 
-SHORTEST, LONGEST = 0.1, 30.0  # [s], of a stop
-ATTEMPTS, FIRST, USUAL = 10, 5, 2.5  # durations, how many are tried first, and the least of these, of sqrt(length / g)
+SHORTEST, LONGEST = 0.1, 10.0  # of a stop [s], and over what it takes usually
+ATTEMPTS, FIRST, USUAL = 8, 4, 2.5  # durations, how many are tried first, and the least of these, of sqrt(length / g)
+CLOSE = 1.1  # times the least excess: of stops that break limits, the shortest that is as good
 LEAST = 1.7  # times that carriers need at their largest acceleration: the rate falls up to 2.2 times its mean
 COARSE, FINE, APART = 24, 150, 0.01  # instants of an attempt, and at most of the result; [s] between those, at least
 SMOOTHED = 0.03  # [s], over which tilt is smoothed: a plan's jerk jumps between its nodes
@@ -79,7 +80,9 @@ def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Team
     rests = max(np.abs(velocity).max() for velocity in last) < RESTS
     left = end - begins if rests else np.inf
     soonest = max(SHORTEST, LEAST * _braking_time(robot, trajectory, begins))
-    durations = np.geomspace(soonest, max(min(2 * left, LONGEST), soonest), ATTEMPTS)
+    usual = USUAL * np.sqrt(robot.fixed_lengths.max() / np.linalg.norm(robot.gravity))
+    longest = min(LONGEST * max(usual, soonest), max(2 * left, soonest))
+    durations = np.geomspace(soonest, longest, ATTEMPTS)
     durations, best = durations[durations < left], None
     excess = np.full(len(durations), np.inf)
 
@@ -89,21 +92,20 @@ def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Team
             excess[first:end] = [each for each, _ in tried.worst]
 
     if len(durations):
-        usual = USUAL * np.sqrt(robot.fixed_lengths.max() / np.linalg.norm(robot.gravity))
         middle = min(int(np.searchsorted(durations, usual)), max(len(durations) - FIRST, 0))
         attempt(middle, middle + FIRST)
         if excess[middle] == 0:
             attempt(0, middle)
         elif excess.min() > 0:
             attempt(middle + FIRST, ATTEMPTS)
-        duration = float(durations[np.argmin(excess)])  # the shortest of those that keep the limits
+        duration = float(durations[np.argmax(excess <= CLOSE * excess.min())])
         # With more instants more is exceeded: where no attempt keeps the limits, the result does not either.
         for _ in range(AGAIN if excess.min() == 0 else not rests):
             count = int(np.clip(duration / APART, 10, FINE))
             found = _Stops(robot, trajectory, begins, np.array([duration]), count).only()
             best = found if best is None or found.excess < best.excess else best
             duration *= max(np.sqrt(1.0 + found.excess), LONGER)  # accelerations are as its inverse square
-            if best.excess == 0 or duration >= left:
+            if best.excess == 0 or duration >= min(left, longest):
                 break
     return _remainder(robot, trajectory, begins) if best is None or (rests and best.excess > 0) else best
 
@@ -208,9 +210,12 @@ class _Stops:
         self.platform = [part.reshape(*shape, 6) for part in platform]
         self.tensions = tensions.reshape(*shape, -1)
         self._forces, self._before = (part.reshape(*shape, robot.m, 3) for part in (forces, balance))
-        # The plan's lengths, after its end the last ones.
-        where = trajectory.at(np.minimum(self.tau.ravel(), trajectory.duration or 0.0)) if (after > 0).any() else flat
-        lengths = dynamics_of(robot).cable_lengths(where[0][0], where[1][0])
+        of_cables = dynamics_of(robot).cable_lengths
+        lengths = of_cables(pose, self.planned[0])
+        if (after > 0).any():  # the plan's last ones
+            lengths[after > 0] = of_cables(
+                *(motion[0] for motion in trajectory.at(np.array([trajectory.duration or 0.0])))
+            )
         lengths = r * lengths + (1.0 - r) * np.array(robot.fixed_lengths)
         ends = points.attachments(robot, pose) + (lengths / tensions)[..., None] * forces
         self._ends = ends.reshape(self._forces.shape)  # of cables on carriers
