@@ -308,6 +308,15 @@ class ComputedTorque(Controller):
         self._time, self._seen, self._elapsed = time, seen, dt
         return dt, state, reference
 
+    def _agree(self, sender: "ComputedTorque") -> None:
+        """Take over the command that another controller of the same robot has sent, as if it were the own one."""
+        self._cables["last"], self._actuation[:] = sender._cables["last"], sender._actuation
+        self._last, self._accelerations = sender._last, sender._accelerations
+        self._platform["attitude"] = sender._platform["attitude"]
+        self._of_carriers["ordered"] = sender._of_carriers["ordered"]
+        if sender._lead is not None and self._lead is not None:
+            self._lead.agree(sender._lead)
+
     def _slow_down(self, period: float) -> None:
         """Lower bandwidths for commands that are held for a period [s], or warn of given ones."""
         self._longest, most = self._slow_loops.slow_down(period)

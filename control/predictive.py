@@ -21,14 +21,13 @@ from .bandwidths import PATIENT, STILL, TEAM, TOWING, bandwidths_for, noise_of_v
 from .carrier_references import moved_coordinates
 from .command import HOLD, OTHERWISE, SHIFTED, SOFT, Command
 from .computed_torque import ComputedTorque
-from .hand_over import agree
 from .keep_out import Surroundings
 from .noise import Noise
-from .preview import Preview, turns
+from .preview import STEEPEST, Preview, turns
 from .settings import reach_of, set_reach
 from .stability import grows
 from .state import Reference, State
-from .watch import BLIND, KNOWN, LATE, PAUSE, QUICK, UNSTABLE, HandOver, Watch
+from .watch import BLIND, KNOWN, LATE, PAUSE, QUICK, STEEP, UNSTABLE, HandOver, Watch
 from .weights import ripple, stage_at_home, terminal, weights
 
 TOLERANCE = 1e-6  # of the residuals of a solution
@@ -58,9 +57,9 @@ class Predictive(ComputedTorque):
     The velocity that the model predicts for the commands is compared with the measured one (control/watch.py). This
     `ComputedTorque` takes over until `reset` ("not as modelled") if a tenth of the weight, in addition to the noise of
     `sensors`, is unexplained over about 50 ms, if there is no solution for that long, if noise of the velocity requires
-    more tension than the limits permit, or if carriers turn with too much lag (core/control/turning.c). It controls the
-    robot from the start, with a warning, if the loop is unstable at home because carriers turn before they accelerate,
-    as with cables that begin below their CoM.
+    more tension than the limits permit, if carriers turn with too much lag (core/control/turning.c), or if a pitch goes
+    beyond 1.5 rad. It controls the robot from the start, with a warning, if the loop is unstable at home because
+    carriers turn before they accelerate, as with cables that begin below their CoM.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
@@ -251,13 +250,13 @@ class Predictive(ComputedTorque):
         if self.handed_over is None:
             self._compare(time, dt, reference)
         if self._ahead is not None:
-            agree(self._beside, self)  # what the winches have made of the last command
+            self._beside._agree(self)  # what the winches have made of the last command
         self._beside._turning = None if self.handed_over is None else self._turning  # of the orders that are sent
         beside = self._beside.step(time, state, reference)
         unexplained = np.array(self._watch.unexplained)
         if self.handed_over is not None:
             answered = np.array(OTHERWISE if beside.answered != HOLD else HOLD, dtype=np.int8)
-            agree(self, self._beside)
+            self._agree(self._beside)
             tensions = self._sent(beside.tensions[None])[0]
             return beside._replace(tensions=tensions, answered=answered, unexplained=unexplained)
         tensions, proof = self._predict(time, dt, reference), self._nowhere  # also without cables, or overloaded
@@ -274,7 +273,7 @@ class Predictive(ComputedTorque):
         else:
             answered = self._as_planned if self._solved == time else np.full(1, SHIFTED, dtype=np.int8)
         command = self._command(tensions, answered, proof, alone=True)
-        agree(self._beside, self)
+        self._beside._agree(self)
         if self._turning is not None and (lag := self._turning["lag"][0]):
             self.handed_over = HandOver(time, f"{LATE}, here {1e3 * lag:.0f} ms of {2e3 / self._turned:.0f}")
         return command._replace(unexplained=unexplained)
@@ -293,8 +292,7 @@ class Predictive(ComputedTorque):
         models = self._carried.records_between(before, self._seen)
         self._sent_lately.move_on(time - before, models, end, otherwise, known, self._accelerations)
         self._before = self._seen, motions.copy(), self._platform["disturbance"].copy()
-        given = motions[0, 0, 6:], (end - start)[0, 0, 6:]
-        found = self._watch.compare(self._seen, self._seen - before, *given)
+        found = self._watch.compare(self._seen, self._seen - before, motions[0, 0, 6:], (end - start)[0, 0, 6:])
         self.handed_over = found and found._replace(time=time)
         if found and self._beside._settings["reacts"]:
             self._moved.now(dt, self._measured[0], self._preview.moved_of(self._preview.rows([reference])))
@@ -325,6 +323,9 @@ class Predictive(ComputedTorque):
             return None
         start = np.concatenate([self._measured[0, 0], *placed])
         wanted, carriers, planned, ramps, loads = self._preview.at(time, now, start[3:6])
+        if max(np.abs(wanted[:, 4]).max(), abs(start[4])) > STEEPEST:
+            self.handed_over = HandOver(time, STEEP)
+            return None
         states, controls = self._shifted(time, start, wanted, planned)
         h, m = self._horizon, self.robot.m
         for which in self._followed:  # carriers that fly are where they are, not where they should be
@@ -352,9 +353,8 @@ class Predictive(ComputedTorque):
         worst = max(residual if residual >= 0 else np.inf for residual in h.residuals)  # infinite for nan
         self._is_near = h.converged or (not warm and worst <= NEARLY)
         if worst <= GOOD:
-            states, controls, self._solved = h.states + wanted, h.controls + planned[:-1], time
-            self._guess = states, controls
-            self._watch.solved = self._seen
+            self._guess = states, controls = h.states + wanted, h.controls + planned[:-1]
+            self._solved, self._watch.solved = time, self._seen
         elif not time - self._solved <= self._stages * self._stage + ROUNDING:  # no longer in slow loops
             return None
         pulls = np.minimum(np.maximum(controls[:1, :m], bounds[0]), bounds[1])

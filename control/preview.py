@@ -15,7 +15,7 @@ from .carrier_references import Moved
 from .state import Reference
 
 ROUNDING = 1e-9  # of a period
-STEEPEST = 1.5  # [rad], at home: near a pitch of 90 degrees roll and yaw change so fast that no linear model is right
+STEEPEST = 1.5  # [rad]: near a pitch of 90 degrees roll and yaw change so fast that no linear model is right
 CLOSE = 1e-5  # [m, rad] by which a reference may differ from the one that was announced
 
 

@@ -12,6 +12,7 @@ UNSTABLE = (
     "small errors at home grow under predictive control, whose model omits that carriers turn before they accelerate"
 )
 LATE = "carriers turn with so much lag that their attitude loop is nearly unstable"
+STEEP = "the platform pitches beyond 1.5 rad, where no linear model of its angles is right"
 LOUD = "noise of the measured rates requires more than the tension limits permit: lower bandwidth and observer"
 WINDOW, PAUSE = 0.05, 0.21  # [s]: in which a motion is compared, at least, and at most between two steps
 BLIND, UNCHECKED = 0.015, 0.5  # [s], at most: without a state, and without a comparison

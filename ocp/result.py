@@ -20,12 +20,11 @@ from .tasks.deviation import Deviation
 from .tasks.paths import Motion
 from .tasks.scenario import Scenario
 from .tasks.status import MotionStatus
-from .warnings.fixed_cables import fixed_cables
+from .warnings.cable_lengths import fixed_cables, short_cables
 from .warnings.inside_bodies import between_points, into_each_other, into_places
 from .warnings.instants import Instants
 from .warnings.long_turns import long_turns
 from .warnings.outside_frame import leaves_its_points, outside_frame
-from .warnings.short_cables import short_cables
 from .warnings.slipped_units import slipped_units
 from .warnings.weak_formation import weak_formation
 

@@ -133,6 +133,19 @@ def test_a_robot_is_held_at_a_pitch_of_90_degrees_as_at_any_other(pitch):
         Predictive(turned)
 
 
+def test_predictive_control_hands_over_before_a_pitch_of_90_degrees():
+    turned, _ = with_frame_turned(load("ipanema-2"), np.array([0.0, 1.45, 0.0]))
+    start, end = turned.home.tolist(), turned.home.tolist()
+    end[4] += 0.2
+    line = {"kind": "line", "start": start, "end": end}
+    controller = Predictive(turned)
+    run = simulate(turned, line, controller, duration=1.5, period=2e-3)
+    assert run.passed, run.failures
+    assert run.error.max() < 1e-3
+    assert run.handed_over < run.times[[each.pose[4] < 1.5 for each in run.references].index(False)]
+    assert "pitches beyond 1.5 rad" in controller.handed_over.reason
+
+
 @pytest.mark.parametrize("name", ["cogiro", "ipanema-2", "wang-flying"])
 def test_a_step_gives_the_tensions_of_the_distribution(name):
     robot = load(name)

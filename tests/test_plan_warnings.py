@@ -14,7 +14,7 @@ from towline.errors import InputError
 from towline.models import Dynamics
 from towline.ocp.tasks.paths import LinePath
 from towline.ocp.tasks.task import read_task
-from towline.ocp.warnings.fixed_cables import fixed_cables
+from towline.ocp.warnings.cable_lengths import fixed_cables
 from towline.ocp.warnings.instants import Instants
 from towline.ocp.warnings.long_turns import long_turns
 from towline.ocp.warnings.slipped_units import slipped_units

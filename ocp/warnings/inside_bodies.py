@@ -92,13 +92,7 @@ def between_points(seen: Instants, limits: Sequence[Limit], limited: Sequence[np
     for (limit, _), part in zip(kept, parts, strict=True):
         its = np.hstack([values.pop(0) for _ in part]).min(axis=1)
         if its.min() < -ENTERED:
-            time = seen.times[near[its.argmin()]]
-            meetings.append((float(its.min()), f"{limit.called!r}", f" at t = {time:.3f} s"))
-    if not meetings:
-        return []
-    depth, called, when = min(meetings)
-    others = f" (and {len(meetings) - 1} more)" * (len(meetings) > 1)
-    return [
-        f"{called} passes between the points of the platform: it is {quantity(-depth, 'm', 3)} inside the hull of "
-        f"its centre of mass and attachments{when}{others}; a platform.body in the robot's file would keep it out"
-    ]
+            when, deep = seen.times[near[its.argmin()]], quantity(-its.min(), "m", 3)
+            sentence = f"{limit.called!r} passes between the points of the platform: it is {deep} inside the hull of "
+            meetings.append((-float(its.min()), f"{sentence}its centre of mass and attachments at t = {when:.3f} s"))
+    return _worst(meetings, "a platform.body in the robot's file would keep it out")
