@@ -21,6 +21,7 @@ from towline.ocp.warnings.slipped_units import slipped_units
 from towline.ocp.warnings.weak_formation import weak_formation
 
 from .framed import framed
+from .told import told
 from .warm import towline as run
 
 COGIRO = load("cogiro")
@@ -244,7 +245,7 @@ def test_a_wind_in_kilometres_per_hour_is_named_in_the_report():
     )
     assert "are these kilometres per hour?" in " ".join(slipped_units(load("wang-flying"), task))
     found = plan("cogiro", {"path": SLIPPED["millimetres"][0]["path"], "duration": 6})
-    assert "are these millimetres? towline reads metres" in found.report()
+    assert "are these millimetres? towline reads metres" in told(found)
 
 
 def test_a_line_across_the_seam_of_yaw_has_a_shorter_way():
@@ -252,7 +253,7 @@ def test_a_line_across_the_seam_of_yaw_has_a_shorter_way():
     start, end = [0, 0, 1.2, 0, 0, 3.05], [0.3, 0.2, 1.2, 0, 0, -3.05]
     refused = plan("ipanema-1", {"path": {"kind": "line", "start": start, "end": end}, "duration": 4})
     assert not refused.feasible
-    assert "to a yaw of 3.23319 rad" in refused.report()
+    assert "to a yaw of 3.23319 rad" in told(refused)
     shorter = {"kind": "line", "start": start, "end": [*end[:5], -3.05 + 2 * np.pi]}
     found = plan("ipanema-1", {"path": shorter, "duration": 4})
     assert found.feasible

@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 from towline import load, plan, time_along
 from towline.figures.style import typeset
 
+from .told import without_offers
+
 COGIRO = load("cogiro")
 LIFT = [[-1, 0, 2], [-1, 0, 2.5], [1, 0, 2.5], [1, 0, 2]]
 TURNED = [[-1, 0, 2, 0, 0, 0], [-1, 0, 2.5, 0, 0, 0.1], [1, 0, 2.5, 0.1, 0, -0.1], [1, 0, 2, 0, 0, 0]]
@@ -35,7 +37,7 @@ def seen(found, point, low=-np.inf, high=np.inf):
 )
 def test_the_distance_of_legs_is_that_of_the_motion_not_the_option(points, more):
     rate = 20_000 if "blend" in more else 5_000  # [Hz]; what passes within a millimetre is looked at more closely
-    found = plan(COGIRO, {"path": path(points, **more), "duration": 2, "output_rate": rate})
+    found = without_offers(plan(COGIRO, {"path": path(points, **more), "duration": 2, "output_rate": rate}))
     poses = np.array([[*point, 0, 0, 0][:6] for point in points], dtype=float)
     # It passes no other waypoint nearer than its own.
     expected = np.array([seen(found, pose[:3]) for pose in poses])
