@@ -10,13 +10,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from towline.base.errors import InputError
+from towline.figures import style
 from towline.models import Dynamics, available, load
 from towline.solvers import capacity_margin
 from towline.statics.distribution import pose_problem, tensions
 from towline.viewer import Subject, read, serve
 from towline.viewer.geometry import Geometry
 from towline.viewer.posing import at_rest_with, home_at_rest, opening_pose
-from towline.viewer.sliders import whole_steps
+from towline.viewer.sliders import sliders, whole_steps
 from towline.viewer.stage import Stage
 from towline.workspace import Condition, Places, StaticEquilibrium, sample, save
 from towline.workspace.nearest import nearest_feasible
@@ -416,6 +417,42 @@ def test_without_scikit_image_the_points_stay_and_a_line_names_the_extra(space, 
         assert wire.element(label="surface")[1]["disabled"]
         assert wire.scene["/workspace"]["visible"] is not False
         wire.close()
+
+
+@pytest.mark.parametrize("wire", ["wang-flying"], indirect=True)
+def test_sliders_are_shaded_where_the_platform_can_rest(wire):
+    """By one tension problem at a time, for the slider of x and that of a carrier, at a pose away from home."""
+    robot = load("wang-flying")
+
+    def strips(unlike):
+        """Return the strips when they have changed, and are complete."""
+        for _ in range(40):
+            wire.read(0.5)
+            found = [value["content"] for value in wire.panel.values() if "towline-strip" in str(value.get("content"))]
+            if found and found != unlike:
+                return found
+        pytest.fail("no strips")
+
+    before = strips([])
+    wire.set(0.1, label="y [m]")
+    found = strips(before)
+    settings = sliders(robot, Geometry(robot))
+    assert len(found) == len(settings) == 12
+    at = robot.home + np.array([0, 0.1, 0, 0, 0, 0])
+    for number in (0, 6):
+        setting, green = settings[number], []
+        for start, end in re.findall(rf"{style.colour(2)} ([\d.]+)% ([\d.]+)%", found[number]):
+            green.append((float(start), float(end)))
+        assert green
+        for share in np.arange(48) / 47:
+            pose, carriers = at.copy(), robot.carrier_home.copy()
+            owner = pose if setting.carrier is None else carriers[setting.carrier]
+            owner[setting.coordinate] = setting.low + share * (setting.high - setting.low)
+            shaded = any(start <= 100 * (share * 47 + 0.5) / 48 <= end for start, end in green)
+            assert shaded == tensions(robot, pose, carrier_pose=carriers).feasible
+    wire.set(True, label="let it hang")
+    settle(wire)
+    assert not any("towline-strip" in str(value.get("content")) for value in wire.panel.values())
 
 
 @pytest.mark.parametrize(("low", "high"), [(-1.23456, 7.7), (0.0, 0.0), (999_999.0, 1e6), (-3e-4, 2e-4), (5.0, 5.0)])

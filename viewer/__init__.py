@@ -4,7 +4,7 @@
     save_page(subject, "circle.html")
     with serve(subject) as url: ...
 
-The modules `snapshot`, `replay`, `curves`, `cloud`, `sliders` and `labels` compute what is shown,
+The modules `snapshot`, `replay`, `curves`, `cloud`, `sliders`, `feasible_ranges` and `labels` compute what is shown,
 without a browser. Only `server` imports viser, which draws it (extra `viewer`).
 """
 

@@ -69,5 +69,5 @@ class Live:
         threading.Thread(target=go, daemon=True).start()
 
     def close(self) -> None:
-        """Stop playing."""
+        """Stop playing and shading."""
         self._panel.close()

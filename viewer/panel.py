@@ -174,9 +174,8 @@ class Panel:
             self._controls.open(numbers[:6], numbers[6:].reshape(-1, 6))
 
     def close(self) -> None:
-        """Stop playing."""
-        if isinstance(self._controls, TimeLine):
-            self._controls.close()
+        """Stop playing and shading."""
+        self._controls.close()
 
     def _refuse(self, reason: str) -> None:
         """Show why there is no instant to draw."""

@@ -16,6 +16,7 @@ from ..models import Dynamics, Robot, points
 from ..statics.equilibria import rest_near
 from ..workspace import StaticEquilibrium
 from ..workspace.nearest import nearest_feasible
+from .feasible_ranges import Strips
 from .frames import Frames
 from .geometry import Geometry
 from .labels import link
@@ -54,6 +55,7 @@ class Posing:
         owners = list(dict.fromkeys(setting.carrier for setting in self._settings))
         names = {owner: "platform" if owner is None else robot.carriers[owner].name for owner in owners}
         self._sliders: list[Any] = []
+        self._tracks: list[Any] = []
         for owner in owners:
             name = "Platform" if owner is None else f"Carrier {names[owner]}"
             # Teams of six would fill the screen.
@@ -61,6 +63,8 @@ class Posing:
                 for it in self._settings:
                     if it.carrier == owner:
                         self._sliders.append(gui.add_slider(it.label, it.low, it.high, it.step, self._value(it)))
+                        self._tracks.append(gui.add_html(""))
+        self._strips = Strips(robot, self._settings, self._shade)
         self._hang = gui.add_checkbox(
             "let it hang",
             few_cables(robot),
@@ -181,6 +185,10 @@ class Posing:
                     self._refuse(refused)
                 else:
                     self._show(instant)
+            if self._hang.value:
+                self._shade([""] * len(self._tracks))
+            else:
+                self._strips.want(pose, carriers)
 
     def open(self, pose: np.ndarray, carriers: np.ndarray) -> None:
         """Move to poses (6,) and (c, 6), as far as the sliders reach."""
@@ -191,6 +199,18 @@ class Posing:
             )
             here[setting.coordinate] = min(max(float(there[setting.coordinate]), setting.low), setting.high)
         self._go(wanted, places)
+
+    def close(self) -> None:
+        """Stop shading the sliders."""
+        self._strips.close()
+
+    def _shade(self, strips: list[str]) -> None:
+        """Show strips below the sliders; none while the platform hangs, because it then rests elsewhere."""
+        with self._server.atomic():
+            for track, content in zip(self._tracks, strips, strict=True):
+                shown = "" if self._hang.value else content
+                if track.content != shown:
+                    track.content = shown
 
     def _value(self, setting: Slider) -> float:
         """Return the value of a coordinate inside the range of its slider, with two digits more than its steps."""
