@@ -15,7 +15,6 @@ from ..models.record import record_of
 from ..solvers.in_place import InPlace
 from .as_floats import ROUNDING, as_floats, is_time, measured_at, rows_of
 from .bandwidths import HELD, SWINGING, bandwidths_for, place_for
-from .boxes import boxes, stay_inside
 from .carried_load import CarriedLoad
 from .command import NOTHING, NOWHERE, PLANNED, SHIFTED, SOFT, Command
 from .controllability import uncontrolled
@@ -27,7 +26,7 @@ from .late_states import LateStates
 from .noise import Noise
 from .one_at_a_time import OneAtATime
 from .records import CABLE, CARRIER, PLATFORM, TURNING
-from .settings import limits_of, reach_of, set_reach, settings_of
+from .settings import boxes, limits_of, reach_of, set_reach, settings_of, stay_inside
 from .slow_loops import SlowLoops
 from .state import Reference, State
 from .tension_loop import TensionLoop

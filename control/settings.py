@@ -1,4 +1,4 @@
-"""`settings_of`: check the arguments of a controller and convert them to the record of the core."""
+"""`settings_of`: check the arguments of a controller and convert them for the core; `boxes`, where carriers may be."""
 
 from typing import Any, NamedTuple
 
@@ -95,3 +95,21 @@ def positive(name: str, value: Any, size: int) -> np.ndarray:
     if not ((result >= 0) & (result <= 1e9)).all():
         raise InputError(f"{name} must be numbers from 0 to 1e9, one or {size}, got {shown(value)}")
     return result
+
+
+def boxes(robot: Robot) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the smallest and largest coordinates of the carriers' reach, (c, 3) each [m]; None if it is unlimited."""
+    each = [carrier.motion_limits.reach for carrier in robot.carriers]
+    if not any(each):
+        return None
+    low = np.array([(-np.inf,) * 3 if box is None else box.min for box in each])
+    return low, np.array([(np.inf,) * 3 if box is None else box.max for box in each])
+
+
+def stay_inside(carriers: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
+    """Clip the carriers' motions, (N, c, 3, 6), to their boxes, (c, 3) [m]."""
+    place = carriers[:, :, 0, :3]
+    outside = (place < low) | (place > high)
+    if outside.any():
+        np.clip(place, low, high, out=place)
+        carriers[:, :, 1, :3][outside] = carriers[:, :, 2, :3][outside] = 0.0

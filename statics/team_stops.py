@@ -79,7 +79,9 @@ def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Team
     last = [motion[1] for motion in trajectory.at(np.array([end]))]
     rests = max(np.abs(velocity).max() for velocity in last) < RESTS
     left = end - begins if rests else np.inf
-    soonest = max(SHORTEST, LEAST * _braking_time(robot, trajectory, begins))
+    speeds = np.linalg.norm(trajectory.at(np.array([begins]))[1][1][0, :, :3], axis=1)
+    braking = speeds / [carrier.motion_limits.acceleration or np.inf for carrier in robot.carriers]  # [s]
+    soonest = max(SHORTEST, LEAST * float(braking.max()))
     usual = USUAL * np.sqrt(robot.fixed_lengths.max() / np.linalg.norm(robot.gravity))
     longest = min(LONGEST * max(usual, soonest), max(2 * left, soonest))
     durations = np.geomspace(soonest, longest, ATTEMPTS)
@@ -108,13 +110,6 @@ def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Team
             if best.excess == 0 or duration >= min(left, longest):
                 break
     return _remainder(robot, trajectory, begins) if best is None or (rests and best.excess > 0) else best
-
-
-def _braking_time(robot: Robot, trajectory: Trajectory, begins: float) -> float:
-    """Return the time in which each carrier can rest at its largest acceleration, if that is limited [s]."""
-    speeds = np.linalg.norm(trajectory.at(np.array([begins]))[1][1][0, :, :3], axis=1)
-    limits = [carrier.motion_limits.acceleration or np.inf for carrier in robot.carriers]
-    return float((speeds / np.array(limits)).max())
 
 
 def _have_one_each(robot: Robot) -> bool:
