@@ -52,8 +52,7 @@ def flight(trajectory: xr.Dataset) -> style.Figure:
         ax.set_xlim(time[0], _end(time))
     canvas.align_ylabels(panels[:-1])
     _mark_events(panels, trajectory)
-    style.legend_below(canvas, panels[0])  # of a tolerance outside the plot, and of events
-    return canvas
+    return style.legend_below(canvas, panels[0])  # of a tolerance outside the plot, and of events
 
 
 def tensions(trajectory: xr.Dataset) -> style.Figure:

@@ -132,7 +132,7 @@ def legend(subject: Subject, cell: float) -> str:
     """Return the meaning of colours and marks that can occur, as HTML; `cell` is the edge of the grid's cells [m]."""
     robot, shown = subject.robot, [motion for motion in (subject.replay, subject.other) if motion]
     missing = not shown or any(np.isnan(motion.tensions).any() for motion in shown)
-    bar = _gradient(_limit("t_min", robot.t_min), _limit("t_max", robot.t_max))
+    bar = _gradient(*(f"t_{end} = {quantity_range(getattr(robot, f't_{end}'), 'N', 6)}" for end in ("min", "max")))
     marks = [("platform", style.colour(4))]
     marks += [("no feasible tensions", NO_TENSION)] if missing else []
     marks += [("cable that has been cut", NO_TENSION)] if any("cut" in it.dataset for it in shown) else []
@@ -153,12 +153,6 @@ def legend(subject: Subject, cell: float) -> str:
         f"<div>cable tension between its limits, logarithmic</div>{bar}"
         f'{"".join(rows)}{summary}<div style="color:{MUTED}">cells of the grid: {cell:g} m</div></div>'
     )
-
-
-def _limit(name: str, limits: np.ndarray) -> str:
-    """Return a limit, or the range of the limits if those of the cables differ."""
-    low, high = float(limits.min()), float(limits.max())
-    return f"{name} = {quantity_range((low, high), 'N', 6)}"
 
 
 def note(message: str) -> str:
