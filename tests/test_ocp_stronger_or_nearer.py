@@ -1,5 +1,6 @@
 """Advice where no duration is feasible: a nearer end, a lighter platform, stronger cables; each is planned."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -539,6 +540,8 @@ def test_a_path_that_leaves_the_frame_on_both_sides_is_drawn_in_towards_home():
 
     (offer,) = plan("ipanema-1", task(1.0)).relaxations
     assert offer.name == "size of the path"
+    named = [[float(number) for number in point.split(", ")] for point in re.findall(r"\(([^)]*)\)", offer.detail)]
+    assert np.allclose(named, offer.plan.trajectory["pose"].values[[0, -1], :3], atol=1e-4)
     assert plan("ipanema-1", task(offer.possible / 100)).feasible
     assert not plan("ipanema-1", task(1.05 * offer.possible / 100)).feasible
 

@@ -74,8 +74,8 @@ def near_home(scenario: Scenario) -> Change | None:
 
     def about_home(share: float) -> Variation:
         smaller = shrunk(path, home, share)
-        ends = [(f"{name} ", getattr(smaller, name)) for name in POINT if hasattr(smaller, name)]
-        points = ends or [("", point) for point in smaller.points]
+        points = [(f"{name} ", getattr(smaller, name)) for name in POINT if hasattr(smaller, name)]
+        points += [("", point) for point in getattr(smaller, "points", ())]
         named = ", ".join(f"{name}({quantity_row(point[:3], digits=6)})" for name, point in points[:MOST_NAMED])
         named += ", ..." * (len(points) > MOST_NAMED)
         return along(scenario, smaller), 100 * share, f"of it, shrunk towards home: {named} m"
