@@ -8,6 +8,8 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...solvers import solve_batch
+from ..global_path.at_rest import AtRest
+from ..global_path.space import Space
 from ..plan import Plan
 from ..proofs.infeasible_ends import infeasible_ends
 from ..result import Relaxed
@@ -16,14 +18,15 @@ from ..tasks.lay_out import with_task
 from ..tasks.paths import AnyPath
 from ..tasks.scenario import ATTITUDE, Scenario
 from ..tasks.wind_set import possible_winds_at
-from .relaxations import ORDERS, planned, rounded
+from .relaxations import ORDERS, at_ease, planned, rounded
 from .search import Search
 
 INSTANTS = 120  # at which tensions must exist before a motion is audited
-HALVINGS = 10
+HALVINGS, OF_PROOFS = 10, 5  # the latter where a program decides what is offered
 RESERVES = 1.0, 0.98, 0.9  # of the largest share with tensions at these instants, tried in order until an audit passes
-OF_PROGRAMS = 0.25, 0.5, 0.75, 0.9  # of it, if programs decide: in order until one has no solution
+OF_PROGRAMS = 0.5, 0.9  # of it, if programs decide: in order until one has no solution
 LEAST = 0.1  # of it, if the first one has none
+HURRIED = 2.0  # times shorter than with small accelerations: flying carriers hardly move a load any faster
 EASIEST = 1e-3  # the share at which changes together are as easy as can be
 
 Variation: TypeAlias = tuple[Scenario, float, str]
@@ -71,44 +74,45 @@ def together(search: Search, scenario: Scenario, makers: Sequence[Maker]) -> lis
     """Return changes that make a motion feasible only together; [] if all of them do not.
 
     Each change is as easy as can be at first. In the order of `makers`, each is left out if the others suffice without
-    it (at the end, if only programs show that). The others have the largest share that all can have, and then each as
-    much as it can.
+    it. The others have the largest share that all can have, and then each as much as it can. If only programs show what
+    suffices, and they do not find a motion with the few changes left, all are tried.
     """
 
     def easy(makers: Sequence[Maker]) -> bool:
         easiest = _legal(lambda share: _changed(scenario, makers, np.full(len(makers), share))[1], EASIEST)
         return easiest is not None and _may_be_feasible(easiest, rates=True)
 
-    def at(shares: np.ndarray) -> Scenario:
-        return _changed(scenario, kept, shares)[1]
-
-    kept = [make for make in makers if make(scenario) is not None]
-    if not easy(kept):
+    kept = every = [make for make in makers if make(scenario) is not None]
+    if not easy(every):
         return []
-    for make in () if by_programs(scenario) else tuple(kept):
+    for make in tuple(every):
         others = [each for each in kept if each is not make]
         kept = others if easy(others) else kept
-    every = np.ones(len(kept))
+    found = _with_shares(search, scenario, kept)
+    if found is None and by_programs(scenario) and len(kept) < len(every):
+        kept, found = every, _with_shares(search, scenario, every)
+    if found is None:
+        return []
+    shares, plan = found
+    changes, _ = _changed(scenario, kept, shares)
+    offered = zip(changes, shares, strict=True)
+    return [change.offer(max(float(share), change.least), plan) for change, share in offered]
+
+
+def _with_shares(search: Search, scenario: Scenario, makers: Sequence[Maker]) -> tuple[np.ndarray, Plan] | None:
+    """Return the largest shares of changes together whose plan is feasible, and this plan; None if none is found."""
+
+    def at(shares: np.ndarray) -> Scenario:
+        return _changed(scenario, makers, shares)[1]
+
+    every = np.ones(len(makers))
     shares = every * _largest(lambda share: at(share * every), EASIEST)  # the same for all
-    for row in np.eye(len(kept), dtype=bool):
+    for row in np.eye(len(makers), dtype=bool):
         shares = np.where(
             row, _largest(lambda share, row=row, others=shares: at(np.where(row, share, others)), shares.min()), shares
         )
     found = _planned(search, lambda part: at(part * shares), "audit, changes together")
-    if found is None:
-        return []
-    part, plan = found
-    shares = part * shares
-    for make in tuple(kept) if by_programs(scenario) else ():
-        left = np.array([each is not make for each in kept])
-        others = [each for each in kept if each is not make]
-        varied = _legal(lambda _, those=others, its=shares[left]: _changed(scenario, those, its)[1], 1.0)
-        guess = plan.deviation
-        if others and varied and (without := planned(search, varied, "audit, fewer changes together", guess)):
-            kept, shares, plan = others, shares[left], without
-    changes, _ = _changed(scenario, kept, shares)
-    offered = zip(changes, shares, strict=True)
-    return [change.offer(max(float(share), change.least), plan) for change, share in offered]
+    return found and (found[0] * shares, found[1])
 
 
 def _changed(scenario: Scenario, makers: Sequence[Maker], shares: np.ndarray) -> tuple[list[Change], Scenario]:
@@ -126,7 +130,7 @@ def _changed(scenario: Scenario, makers: Sequence[Maker], shares: np.ndarray) ->
 
 def _largest(at: Callable[[float], Scenario], low: float = 0.0, high: float = 1.0, rates: bool = True) -> float:
     """Return the largest share between two whose scenario may be feasible; the lowest if none is known to be."""
-    for _ in range(HALVINGS):
+    for _ in range(OF_PROOFS if by_programs(at(1.0)) else HALVINGS):
         middle = (low + high) / 2
         varied = _legal(at, middle)
         low, high = (middle, high) if varied and _may_be_feasible(varied, rates) else (low, middle)
@@ -186,9 +190,10 @@ def _may_be_feasible(scenario: Scenario, rates: bool) -> bool:
     need only exert the force.
     """
     if _off_path(scenario):
-        return infeasible_ends(scenario) is None
+        hurried = bool(scenario.carrier_free) and at_ease(scenario) > HURRIED * scenario.duration
+        return not hurried and rests(scenario) and infeasible_ends(scenario) is None
     times = np.linspace(0.0, scenario.duration, INSTANTS)
-    if exceeds(scenario, times, rates):
+    if exceeds(scenario, times, rates).any():
         return False
     times = times[~scenario.phases.resting(times)]
     platform, carriers = scenario.motion(times, None)
@@ -207,20 +212,26 @@ def _may_be_feasible(scenario: Scenario, rates: bool) -> bool:
     return True
 
 
-def exceeds(scenario: Scenario, times: np.ndarray, rates: bool) -> bool:
-    """Return whether a fixed motion exceeds a hard limit that does not depend on tensions at some of `times`.
+def rests(scenario: Scenario) -> bool:
+    """Return whether tensions hold the platform at rest at both ends, with carriers where they are at first."""
+    space = Space(scenario)
+    return bool((AtRest(scenario, space.size)(*space.poses(space.ends)).worst >= 0).all())
+
+
+def exceeds(scenario: Scenario, times: np.ndarray, rates: bool) -> np.ndarray:
+    """Return at which of `times` (n,) a fixed motion exceeds a hard limit that does not depend on tensions.
 
     Without `rates`, speeds and accelerations are left out.
     """
-    limits, motion = scenario.limits, scenario.motion(times, None)
+    limits, motion, exceeded = scenario.limits, scenario.motion(times, None), np.zeros(len(times), dtype=bool)
     for limit, values in zip(limits, limits.along(*motion), strict=True):
         counts = rates or not limit.unit.endswith(tuple(ORDERS))
         if counts and limit.soft is None and limit.name not in limits.of_tensions:
             values = np.where(scenario.in_force(limit, times)[:, None], values, np.nan)
             over = limit.over(times, values)
-            if (over > limit.high + limit.tolerance).any() or (over < limit.low - limit.tolerance).any():
-                return True
-    return False
+            beyond = (over > limit.high + limit.tolerance) | (over < limit.low - limit.tolerance)
+            exceeded |= beyond.any(axis=1)
+    return exceeded
 
 
 def along(scenario: Scenario, path: AnyPath) -> Scenario:

@@ -10,13 +10,11 @@ from ...solvers.margins import margins
 from ..audits.tensions import scaled
 from ..global_path.at_rest import AtRest
 from ..global_path.shortest_shifts import shortest_shifts
-from ..result import Relaxed
 from ..tasks.paths import CirclePath, FeedPath, LinePath, WaypointPath
 from ..tasks.paths.base import PathBase
 from ..tasks.scenario import Scenario
 from .largest_share import RESERVES, Change, Variation, along
-from .relaxations import planned, rounded
-from .search import Search
+from .relaxations import rounded
 
 LEAST = 0.05  # of a path: with less, other changes are better advice
 MOST_NAMED = 5  # points of a smaller path that its advice gives
@@ -83,36 +81,40 @@ def near_home(scenario: Scenario) -> Change | None:
     return Change("size of the path", "%", about_home, least=LEAST)
 
 
-def shifted_path(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the smallest shift of the whole path along an axis of {G} with which it is feasible.
+def shortest_shift(scenario: Scenario, balance: bool = True) -> np.ndarray | None:
+    """Return the shortest shift (3,) [m] of the whole path along an axis of {G} to where all limits are kept at rest.
 
-    Shifts are compared at rest, at some positions of the path; the audit decides. The list is empty where other
-    positions of the carriers are better advice.
+    Shifts are compared at some positions of the path; without `balance` it does not matter whether there are tensions.
+    None where no shift is necessary, or where other positions of the carriers are better advice.
     """
-    task, path, robot = scenario.task, scenario.task.path, scenario.robot
+    task, robot = scenario.task, scenario.robot
     movable = any(carrier.free_coordinates(robot.drive) for carrier in robot.carriers)
     if movable or scenario.relative or task.phases is not None or task.initial is not None:
-        return []
-    times = np.linspace(0.0, scenario.duration, PLACES)
-    platform, carriers = scenario.motion(times, None)
+        return None
+    platform, carriers = scenario.motion(np.linspace(0.0, scenario.duration, PLACES), None)
     size = float(np.linalg.norm(np.ptp(robot.home_anchors, axis=0)))
-    kept = AtRest(scenario, size)
+    kept = AtRest(scenario, size, balance=balance)
 
     def holds(by: np.ndarray) -> bool:
         poses = platform.pose.copy()
         poses[:, :3] += by
         return bool((kept(poses, carriers.pose).slack >= 0).all())
 
-    shortest = None if holds(np.zeros(3)) else next(shortest_shifts(scenario, size, holds), None)
+    return None if holds(np.zeros(3)) else next(shortest_shifts(scenario, size, holds), None)
+
+
+def shifted_path(scenario: Scenario, shortest: np.ndarray | None) -> Change | None:
+    """Return the change of the place of the whole path, by a little more than the shortest shift that is necessary."""
     if shortest is None:
-        return []
-    axis = int(np.abs(shortest).argmax())
-    for reserve in RESERVES:
-        by = rounded(float(np.abs(shortest[axis])) / reserve, up=True) * np.sign(shortest)
-        moved = along(scenario, shifted(path, by))
-        if (plan := planned(search, moved, "audit, shifted path")) is not None:
-            return [Relaxed("shift of the path", "m", 0.0, float(by[axis]), plan, f"along {'xyz'[axis]}")]
-    return []
+        return None
+    axis, way = int(np.abs(shortest).argmax()), np.sign(shortest)
+    farthest = float(np.abs(shortest[axis])) / RESERVES[-1]
+
+    def by(share: float) -> Variation:
+        shift = rounded((1 - share) * farthest, up=True) * way
+        return along(scenario, shifted(scenario.task.path, shift)), float(shift[axis]), f"along {'xyz'[axis]}"
+
+    return Change("shift of the path", "m", by, up=bool(way[axis] > 0), requested=0.0)
 
 
 def other_yaws(scenario: Scenario) -> Change | None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from itertools import chain
+from typing import TypeAlias
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ..plan import Plan
 from ..proofs.durations import durations
 from ..result import Relaxed
 from ..tasks.lay_out import with_task
-from ..tasks.paths import LinePath, WaypointPath
+from ..tasks.paths import FeedPath, LinePath, WaypointPath
 from ..tasks.scenario import POSITION, Scenario
 from ..tasks.task_limits import OF_BODY
 from .largest_share import along, by_programs, exceeds
@@ -23,41 +24,42 @@ from .relaxations import other_duration, planned, rounded
 from .search import Search
 
 IN_THE_WAY = {"keep_out", "cable_clearance", *OF_BODY}  # limits
-ENDS = ("start", "end")
 STEPS = 100  # at least, in the robot's size: positions are offered in round steps
 PLACES = 51  # of a line that are checked
 CONFIGURATIONS = 2_000, 3_000  # that are evaluated with each reserve for a way round: it need not be found
 SHAPES = ("legs", "straight through"), ("spline", "as a spline through")
 MOST_POINTS = 12  # of a way round, between its ends
 LOOKS = 301  # at a way round before it is audited
+Lines: TypeAlias = LinePath | WaypointPath | FeedPath
 
 
 def past_regions(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the path past what is in the way of a line: between clear ends near its own, round what is between them.
+    """Return the path past what is in the way of lines: through clear points near its own, round what is between them.
 
     A way round is not searched for where a tube already lets the planner, nor where only programs show if it is
-    feasible. It has as few waypoints as pass the audit, with straight legs or a spline. Each end that moves is a
-    change, and so is a duration that its length needs.
+    feasible. It has as few further points as pass the audit; a line becomes straight legs or a spline. Each point that
+    moves is a change, and so is a duration that its length needs.
     """
-    line = scenario.task.path
-    if not isinstance(line, LinePath) or scenario.relative or scenario.task.phases is not None:
+    path = scenario.task.path
+    if not isinstance(path, Lines) or scenario.relative or scenario.task.phases is not None:
         return []
-    moved = _clear_ends(scenario)
-    ends, changes = {}, []
-    for end, place in moved.items():
-        given = np.array(getattr(line, end))
-        ends[end] = (*place.tolist(), *given[3:].tolist())
-        away = rounded(float(np.linalg.norm(place - given[:3])), up=True)
-        changes.append((f"shift of path.{end}", 0.0, away, f"to ({quantity_row(place + 0.0)}) m"))
-    between = along(scenario, line.model_copy(update=ends)) if moved else scenario
+    line = isinstance(path, LinePath)
+    given = np.array([path.start, path.end] if line else path.points)
+    moved, changes, points = _clear_points(scenario, given), [], given.copy()
+    for k, place in moved.items():
+        name = ("start", "end")[k] if line else f"points[{k}]"
+        points[k, :3] = place
+        away = rounded(float(np.linalg.norm(place - given[k, :3])), up=True)
+        changes.append((f"shift of path.{name}", 0.0, away, f"to ({quantity_row(place + 0.0)}) m"))
+    between = along(scenario, _through(path, points, np.arange(len(points)))) if moved else scenario
     plan = _lasting(search, between) if moved else None
     if plan is None and not by_programs(scenario) and scenario.task.tube.position != "free":
-        for how, places, way in _ways_round(between):
+        for how, places, new, way in _ways_round(between, path, points):
             if (plan := _lasting(search, way)) is not None:
                 length, whole = (
-                    np.linalg.norm(np.diff(each, axis=0), axis=1).sum() for each in (places, places[[0, -1]])
+                    np.linalg.norm(np.diff(each, axis=0), axis=1).sum() for each in (places, points[:, :3])
                 )
-                through = ", ".join(f"({quantity_row(place + 0.0)})" for place in places[1:-1])
+                through = ", ".join(f"({quantity_row(place + 0.0)})" for place in places[new])
                 way_round = rounded(float(length), up=True)
                 changes.append(("length of a way round", float(whole), way_round, f"{how} {through} m"))
                 break
@@ -65,6 +67,23 @@ def past_regions(search: Search, scenario: Scenario) -> list[Relaxed]:
         return []
     seconds = f", with a duration of {quantity(plan.duration, 's')}" * (plan.duration != scenario.duration)
     return [Relaxed(what, "m", given, now, plan, text + seconds) for what, given, now, text in changes]
+
+
+def _through(path: Lines, points: np.ndarray, at: np.ndarray) -> Lines:
+    """Return a path through points (n, 6) that lie `at` places (n,) among its own, which are 0, 1, 2 and so on."""
+    if isinstance(path, LinePath):
+        return path.model_copy(update={"start": tuple(points[0].tolist()), "end": tuple(points[-1].tolist())})
+    data, own = path.model_dump(), np.arange(len(path.points))
+    for name in ("times", "shares"):
+        if data.get(name) is not None:
+            data[name] = np.interp(at, own, data[name]).tolist()
+    if data["dwell"] is not None:
+        data["dwell"] = [data["dwell"][int(k)] if k in own else 0.0 for k in at]
+    if data.get("feeds") is not None:
+        data["feeds"] = [data["feeds"][int(k)] for k in at[:-1]]
+    if "order" in data:
+        data["order"] = "given"
+    return type(path).model_validate(data | {"points": points.tolist()})
 
 
 def _lasting(search: Search, scenario: Scenario) -> Plan | None:
@@ -75,13 +94,54 @@ def _lasting(search: Search, scenario: Scenario) -> Plan | None:
     return next((each.plan for each in other_duration(search, scenario, durations(scenario), audit)), None)
 
 
-def _ways_round(scenario: Scenario) -> Iterator[tuple[str, np.ndarray, Scenario]]:
-    """Yield how, through which points (k, 3) and in which scenario a path leads past what is in the way.
+def _ways_round(
+    scenario: Scenario, path: Lines, points: np.ndarray
+) -> Iterator[tuple[str, np.ndarray, np.ndarray, Scenario]]:
+    """Yield how, through which places (n, 3), of which some are new (n,), and in which scenario a path leads past.
 
-    There are ever more points.
+    What is in the way is between `points` (k, 6) of the path. There are ever more places.
     """
+    shares = np.linspace(0.0, 1.0, LOOKS)
+    passed, blocked = _passed(scenario, points), exceeds(scenario, shares * scenario.duration, rates=False)
+    legs = np.searchsorted(passed[1:-1], np.flatnonzero(blocked) if blocked.any() else passed[:-1], side="right")
+    found = {leg: _way_round(scenario, points[leg], points[leg + 1]) for leg in np.unique(legs).tolist()}
+    ways = {leg: way for leg, way in found.items() if way is not None}
+    if len(ways) < len(found):
+        return
+    chosen = {leg: [0, LOOKS - 1] for leg in ways}
+    for _ in range(MOST_POINTS):
+        for leg, poses in ways.items():
+            its = chosen[leg]
+            straight = np.stack([np.interp(shares, shares[its], column[its]) for column in poses.T], axis=1)
+            farthest = int(np.linalg.norm((poses - straight)[:, :3], axis=1).argmax())
+            chosen[leg] = sorted({*its, farthest or LOOKS // 2})
+        own = {leg: (np.zeros(1), points[[leg]]) for leg in range(len(points))}
+        own |= {leg: (shares[its[:-1]], ways[leg][its[:-1]]) for leg, its in chosen.items()}
+        at = np.concatenate([leg + share for leg, (share, _) in own.items()])
+        through = np.vstack([poses for _, poses in own.values()])
+        for shape, how in SHAPES if isinstance(path, LinePath) else ((None, "through"),):
+            legs = {"kind": "waypoints", "points": through.tolist(), "shape": shape}
+            way = along(scenario, WaypointPath.model_validate(legs) if shape else _through(path, through, at))
+            if not exceeds(way, np.linspace(0.0, way.duration, LOOKS), rates=False).any():
+                yield how, through[:, :3], at % 1 > 0, way
+
+
+def _passed(scenario: Scenario, points: np.ndarray) -> np.ndarray:
+    """Return at which of `LOOKS` instants a motion is nearest to each of points (k, 6), (k,), in order."""
+    poses = scenario.motion(np.linspace(0.0, scenario.duration, LOOKS), None)[0].pose
+    passed = [0]
+    for point in points[1:-1]:
+        passed.append(passed[-1] + int(np.linalg.norm((poses[passed[-1] :] - point)[:, :3], axis=1).argmin()))
+    return np.array([*passed, LOOKS - 1])
+
+
+def _way_round(scenario: Scenario, start: np.ndarray, end: np.ndarray) -> np.ndarray | None:
+    """Return the poses (LOOKS, 6) of a way between two past what is in the way; None if none is found."""
     tube, limits = scenario.task.tube, scenario.task.limits
-    free = with_task(scenario, tube=tube.model_copy(update={"position": "free"}))
+    line = LinePath.model_validate({"kind": "line", "start": start.tolist(), "end": end.tolist()})
+    given = {} if isinstance(scenario.task.path, LinePath) else {"initial": None, "final": None}
+    leg = {"path": line, "duration": scenario.duration, "tube": tube.model_copy(update={"position": "free"})} | given
+    free = with_task(scenario, **leg)
     if limits.platform_box is None:
         low, high = Space(free).box
         low[2] = max(low[2], min(_floor(scenario), *Space(free).references[0][:, 2]))
@@ -89,56 +149,47 @@ def _ways_round(scenario: Scenario) -> Iterator[tuple[str, np.ndarray, Scenario]
         free = with_task(free, limits=limits.model_copy(update={"platform_box": box}))
     found, _ = find_global_path(free, most=CONFIGURATIONS)
     if found is None:
-        return
+        return None
     axes = [axis for axis in POSITION if scenario.robot.dof_mask[axis]]
-    shares = np.linspace(0.0, 1.0, LOOKS)
-    poses, _ = found.space.poses(found.at(shares))
+    poses, _ = found.space.poses(found.at(np.linspace(0.0, 1.0, LOOKS)))
     for pose in poses[1:-1]:
         pose[axes] = [rounded(value, up=False) for value in pose[axes]]
-    chosen = [0, LOOKS - 1]
-    for _ in range(MOST_POINTS):
-        straight = np.stack([np.interp(shares, shares[chosen], column[chosen]) for column in poses.T], axis=1)
-        chosen = sorted([*chosen, int(np.linalg.norm((poses - straight)[:, :3], axis=1).argmax())])
-        if len(set(chosen)) < len(chosen):
-            return
-        for shape, how in SHAPES:
-            fields = {"kind": "waypoints", "points": poses[chosen].tolist(), "shape": shape}
-            way = along(scenario, WaypointPath.model_validate(fields))
-            if not exceeds(way, np.linspace(0.0, way.duration, LOOKS), rates=False):
-                yield how, poses[chosen, :3], way
+    return poses
 
 
-def _clear_ends(scenario: Scenario) -> dict[str, np.ndarray]:
-    """Return, by the ends of a line at which the robot cannot rest, a near position (3,) at which it can.
+def _clear_points(scenario: Scenario, points: np.ndarray) -> dict[int, np.ndarray]:
+    """Return, by those of points (k, 6) at which the robot cannot rest, a near position (3,) at which it can.
 
     If there is none, as where cables cross a wall through the robot, no path leads from there either.
     """
     space = Space(scenario)
-    platform, carriers = space.references
+    times = _passed(scenario, points) * scenario.duration / (LOOKS - 1)
+    carriers = np.stack([carrier.pose for carrier in scenario.references(times)[1]], axis=1)
     kept = AtRest(scenario, space.size, spare=0.0)
-    limits_alone = AtRest(scenario, space.size, balance=False)(platform, carriers)
-    moved, others = {}, platform[:, :3].copy()
-    held = kept(platform, carriers).slack >= 0
-    for end, (slack, worst) in enumerate(zip(limits_alone.slack, limits_alone.worst, strict=True)):
-        if held[end] or (slack < 0 and scenario.limits.all[worst].name not in IN_THE_WAY):
+    limits_alone = AtRest(scenario, space.size, balance=False)(points, carriers)
+    moved, others = {}, points[:, :3].copy()
+    held = kept(points, carriers).slack >= 0
+    for k, (slack, worst) in enumerate(zip(limits_alone.slack, limits_alone.worst, strict=True)):
+        if held[k] or (slack < 0 and scenario.limits.all[worst].name not in IN_THE_WAY):
             continue
-        if (place := _nearest(scenario, kept, space, end, others[1 - end])) is not None:
-            moved[ENDS[end]] = others[end] = place
+        beside = others[[near for near in (k - 1, k + 1) if 0 <= near < len(points)]]
+        if (place := _nearest(kept, points[k], carriers[k], beside)) is not None:
+            moved[k] = others[k] = place
     return moved
 
 
-def _nearest(scenario: Scenario, kept: AtRest, space: Space, end: int, other: np.ndarray) -> np.ndarray | None:
-    """Return the position nearest to an end, along an axis of {G}, at which the robot can rest; None if none is found.
+def _nearest(kept: AtRest, pose: np.ndarray, carriers: np.ndarray, beside: np.ndarray) -> np.ndarray | None:
+    """Return the position nearest to that of a pose, along an axis of {G}, at which the robot can rest, or None.
 
-    The nearest from which the line to the `other` end is clear is preferred, unless the planner may leave the line by
-    the shift.
+    The nearest from which the lines to positions `beside` it (k, 3) are clear is preferred, unless the planner may
+    leave the line by the shift.
     """
-    (from_, loose), anchors = space.references, scenario.robot.home_anchors
-    size = float(np.linalg.norm(np.ptp(np.vstack([anchors, from_[:, :3]]), axis=0)))
-    step, start = 10.0 ** np.floor(np.log10(size / STEPS)), from_[end, :3]
+    scenario, start = kept.scenario, pose[:3]
+    size = float(np.linalg.norm(np.ptp(np.vstack([scenario.robot.home_anchors, start, beside]), axis=0)))
+    step = 10.0 ** np.floor(np.log10(size / STEPS))
 
     def holds(*moved: np.ndarray) -> bool:
-        return bool((_slack(kept, space, from_[end], loose[end], np.array(moved)) >= 0).all())
+        return bool((_slack(kept, pose, carriers, np.array(moved)) >= 0).all())
 
     def clear() -> Iterator[np.ndarray]:
         """Yield the nearest clear positions, a step farther than necessary, at a round distance."""
@@ -153,16 +204,18 @@ def _nearest(scenario: Scenario, kept: AtRest, space: Space, end: int, other: np
     if nearest is None or scenario.task.tube.radius >= float(np.linalg.norm(nearest - start)):
         return nearest
     share = np.linspace(0.0, 1.0, PLACES)[:, None]
-    lines = ((place, place - start + share * (other - place)) for place in chain([nearest], places))
-    return next((place for place, line in lines if holds(*line)), nearest)
+    lines = (
+        (place, [place - start + share * (other - place) for other in beside]) for place in chain([nearest], places)
+    )
+    return next((place for place, ways in lines if holds(*np.vstack(ways))), nearest)
 
 
-def _slack(kept: AtRest, space: Space, pose: np.ndarray, carriers: np.ndarray, moved: np.ndarray) -> np.ndarray:
+def _slack(kept: AtRest, pose: np.ndarray, carriers: np.ndarray, moved: np.ndarray) -> np.ndarray:
     """Return by how much limits are kept at rest, (n,), by a robot moved by (n, 3) [m] with its flying carriers."""
     platform = np.tile(pose, (len(moved), 1))
     every = np.tile(carriers, (len(moved), 1, 1))
     platform[:, :3] += moved
-    every[:, space.scenario.loose, :3] += moved[:, None]
+    every[:, kept.scenario.loose, :3] += moved[:, None]
     found = kept(platform, every)
     return np.where(found.points[..., 2].min(axis=1) < _floor(kept.scenario), -np.inf, found.slack)
 

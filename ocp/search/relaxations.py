@@ -276,7 +276,7 @@ def longer_durations(scenario: Scenario) -> tuple[float, float]:
         return longest, longest
     if infeasible_ends(scenario.lasting(shortest)) is not None:
         possible = longest
-        for _ in range(HALVINGS):
+        while possible > (1 + BEYOND) * shortest:
             middle = float(np.sqrt(shortest * possible))
             proven = infeasible_ends(scenario.lasting(middle)) is not None
             shortest, possible = (middle, possible) if proven else (shortest, middle)

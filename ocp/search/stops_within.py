@@ -170,9 +170,14 @@ def _longer(plan: Plan, seconds: float) -> list[Relaxed]:
         longer = planned(search, with_task(scenario, duration=lasts), "audit, slower, to stop in time")
         if longer is None:
             break
-        short = _judged(longer, longer.scenario, seconds)
+        before, short = (
+            short.stop.duration,
+            _judged(longer, longer.scenario, seconds, [short.stop.begins / short.duration]),
+        )
         if short.feasible:
             return [Relaxed("duration", "s", plan.duration, lasts, short)]
+        if short.stop is not None and short.stop.feasible and short.stop.duration >= before:
+            break  # the steps of a stop are as short as they can be
     return []
 
 
@@ -204,12 +209,13 @@ def _that_stop(offers: Callable[[], Offers], seconds: float) -> Offers:
 def _trajectory(plan: Plan, extreme: int | None = None) -> Trajectory:
     """Return the motion of a plan with one of its extreme loads; after the end of the plan the last state is held."""
     scenario, audit = plan.scenario, plan.audit
+    columns = audit.tensions.T.copy()  # NumPy would copy each again for each stop
 
     def at(times: np.ndarray) -> tuple[Motion, Motion]:
         return scenario.motion(np.minimum(times, scenario.duration), plan.deviation)
 
     def tensions(times: np.ndarray) -> np.ndarray:
-        return np.stack([np.interp(times, audit.times, column) for column in audit.tensions.T], axis=1)
+        return np.stack([np.interp(times, audit.times, column) for column in columns], axis=1)
 
     wind = None if scenario.wind is None else np.array(scenario.wind)
     starts = scenario.phases.boundaries[:-1]

@@ -1,6 +1,5 @@
 """What else would make a motion feasible: another path (`other_paths`), less wind or mass, other cables, a tube."""
 
-from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -13,26 +12,35 @@ from ...models import Robot
 from ...models.part import Vector3
 from ..audits.audit import Audit
 from ..audits.excess import TENSIONS
-from ..global_path.at_rest import AtRest
-from ..global_path.space import Space
 from ..plan import Plan
 from ..proofs.durations import durations
 from ..result import Relaxed
 from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out, with_task
+from ..tasks.paths import CirclePath
 from ..tasks.phase import Load
 from ..tasks.scenario import ATTITUDE, Scenario
 from ..tasks.status import MotionStatus
 from ..tasks.task import Tube
 from ..tasks.wind_set import WindBox, WindDisc
-from .largest_share import Change, Variation, by_programs, exceeds, largest_share, together
-from .other_paths import near_home, nearer_end, other_yaws, shifted_path, smaller_circle
+from .largest_share import Change, Variation, by_programs, exceeds, largest_share, rests, together
+from .other_paths import near_home, nearer_end, other_yaws, shifted_path, shortest_shift, smaller_circle
 from .past_regions import IN_THE_WAY, past_regions
-from .relaxations import BEYOND, LONGER, longer_durations, near_motion, other_duration, planned, rounded, slower, solved
+from .relaxations import (
+    BEYOND,
+    LONGER,
+    at_ease,
+    longer_durations,
+    near_motion,
+    other_duration,
+    planned,
+    rounded,
+    slower,
+    solved,
+)
 from .search import Search
 from .slower import longer, longer_phases, slower_rate, slower_states
 
-SHARES = 51  # of t_min that are distinguished at rest
 STRONGEST = 100.0  # times t_max: a motion that needs more is not one that stronger cables make feasible
 MOST = 0.5  # [rad], of a tilt that is offered
 SPARE = 1.01  # times the largest tilt at the nodes
@@ -42,8 +50,16 @@ def near_chosen_motion(search: Search, scenario: Scenario, deviation: Deviation 
     """Return what would make a motion that the planner chooses feasible; `audit` is that of the closest one.
 
     If no duration and no limit of the task does, it is what the platform could do exactly on its path. A longer
-    duration is only tried if nothing proves it infeasible.
+    duration is only tried if nothing proves it infeasible, and if the platform can rest where it starts and ends.
     """
+    chosen, missing = by_programs(scenario), audit.certificate
+    # No cable pulls as is necessary, however strong it is, and slower motions hardly need less.
+    direction = missing is not None and not (audit.excess or missing.at_max.size or missing.at_min.size)
+    slow = at_ease(scenario) <= scenario.duration
+    if chosen and direction and slow and (found := tilting_platform(search, scenario)):
+        return found
+    if chosen and scenario.task.tube.position != "free" and not rests(scenario):
+        return _by_a_program(search, scenario, audit)
     span = longer_durations(scenario)
     slower_helps = span[0] < span[1] or not scenario.stretches
     phases = longer_phases(search, scenario, audit) if slower_helps else []
@@ -56,7 +72,7 @@ def near_chosen_motion(search: Search, scenario: Scenario, deviation: Deviation 
     )
     if found:
         return phases + found
-    if by_programs(scenario):
+    if chosen:
         return phases + _by_a_program(search, scenario, audit)
     along = search.audit_motion(scenario, None, "audit of the path")
     exact = durations(with_task(scenario, tube=Tube()))
@@ -76,14 +92,18 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
         return []
     if by_programs(scenario):
         return _by_a_program(search, scenario, audit)
-    fewer = partial(_fewer_regions, audit=audit)
+    fewer = (partial(_fewer_regions, audit=audit),) * _blocked(audit)
     found = past_regions(search, scenario) if _in_the_way(audit) else []
     found += _changes(search, scenario, audit)
-    if not found and _blocked(audit):
-        found = [each for make in (nearer_end, fewer) for each in largest_share(search, make(scenario))]
-    if found or not _blocked(audit):
-        return found or largest_share(search, near_home(scenario), rates=True) or together(search, scenario, TOGETHER)
-    return together(search, scenario, (fewer, *TOGETHER))
+    if not found and fewer:
+        found = [each for make in (nearer_end, *fewer) for each in largest_share(search, make(scenario))]
+    elif not found:
+        found = largest_share(search, near_home(scenario), rates=True)
+    found = found or together(search, scenario, (*fewer, *OF_CABLES, near_home, *OTHERS))
+    if found or (shift := shortest_shift(scenario, balance=False)) is None:
+        return found
+    makers = *OF_CABLES, partial(shifted_path, shortest=shift), *OTHERS
+    return together(search, scenario, makers) or together(search, scenario, (*fewer, *makers))
 
 
 def _without_regions(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> list[Relaxed]:
@@ -124,26 +144,15 @@ def _in_the_way(audit: Audit) -> bool:
 
 def _by_a_program(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
     """Return the first change with which a program finds a motion, or else all together, since each solves programs."""
-    every = partial(largest_share, search)
+    fewer = (partial(_fewer_regions, audit=audit),) * _blocked(audit)
     found = past_regions(search, scenario) if _in_the_way(audit) else []
-    found = found or every(_smaller_t_min(scenario), most=_balanced_share(scenario))
-    found = found or next(filter(None, (every(make(scenario)) for make in BY_PROGRAMS)), [])
-    found = found or every(near_home(scenario), rates=True)
-    return found or together(search, scenario, (*BY_PROGRAMS, longer))
-
-
-def _balanced_share(scenario: Scenario) -> float:
-    """Return the largest share of t_min with which the formation at both ends rests; 0 if no smaller t_min helps."""
-    change = _smaller_t_min(scenario)
-
-    def rests(varied: Scenario) -> bool:
-        space = Space(varied)
-        return bool((AtRest(varied, space.size)(*space.poses(space.ends)).worst >= 0).all())
-
-    if change is None or rests(scenario) or not rests(change.at(0.0)[0]):
-        return 0.0
-    shares = np.linspace(0.0, 1.0, SHARES)
-    return float(shares[bisect_left(range(SHARES), True, key=lambda k: not rests(change.at(shares[k])[0])) - 1])
+    # A smaller t_min alone helps where the formation does not rest.
+    singles = (*((_smaller_t_min,) * (not rests(scenario))), *BY_PROGRAMS, *fewer)
+    found = found or next(filter(None, (largest_share(search, make(scenario)) for make in singles)), [])
+    found = found or largest_share(search, near_home(scenario), rates=True)
+    others = (*fewer, _smaller_t_min, _less_wind, _lighter_load, nearer_end, longer)
+    # A lighter platform needs a smaller t_min too.
+    return found or together(search, scenario, others) or together(search, scenario, (_lighter_platform, *others))
 
 
 def _changes(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
@@ -154,10 +163,11 @@ def _changes(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
     found = largest_share(search, slower_rate(scenario), rates=True)
     factors = [slower(excess) for excess in audit.excess if excess.limit != TENSIONS]
     if min(factors, default=2.0) <= 1.0 or (factors and not scenario.stretches):
-        if _blocked(audit):
-            inside = exceeds(scenario, np.array([scenario.duration]), rates=False)
+        if _blocked(audit) and not isinstance(scenario.task.path, CirclePath):
+            inside = exceeds(scenario, np.array([scenario.duration]), rates=False).any()
             return found + (largest_share(search, nearer_end(scenario)) if inside else [])
-        return found + (shifted_path(search, scenario) or largest_share(search, nearer_end(scenario)))
+        shift = largest_share(search, shifted_path(scenario, shortest_shift(scenario)))
+        return found + (shift or largest_share(search, nearer_end(scenario)))
     found += tilting_platform(search, scenario)
     seconds = rounded(LONGER * max(factors, default=1.0) * scenario.duration, up=True)
     for make in SINGLE:
@@ -166,7 +176,7 @@ def _changes(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
             lasting, with_it = with_task(scenario, duration=seconds), f", with a duration of {quantity(seconds, 's')}"
             its = [replace(each, detail=each.detail + with_it) for each in largest_share(search, make(lasting))]
         found += its
-    return found + shifted_path(search, scenario)
+    return found + largest_share(search, shifted_path(scenario, shortest_shift(scenario)))
 
 
 def _less_margin(scenario: Scenario) -> Change | None:
@@ -289,11 +299,9 @@ SINGLE = (
     *(nearer_end, smaller_circle, other_yaws, _less_wind, _lighter_load, _surer_load, _lighter_platform),
     *(_larger_t_max, _smaller_t_min),
 )
-# The first are left out first. Stronger cables permit what a lighter platform does, at any t_min.
-TOGETHER = (
-    *(_smaller_t_min, _larger_t_max, near_home, _lighter_load, _less_wind, nearer_end, _less_margin),
-    *(slower_rate, longer),
-)
+# Of changes together the first are left out first. Stronger cables permit what a lighter platform does, at any t_min.
+OF_CABLES = _smaller_t_min, _larger_t_max
+OTHERS = _lighter_load, _less_wind, nearer_end, _less_margin, slower_rate, longer
 BY_PROGRAMS = _less_wind, _lighter_load, _lighter_platform, nearer_end
 
 
