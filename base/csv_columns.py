@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -100,7 +101,7 @@ def _split(line: str, mark: str) -> list[str]:
 
 def _names_and_units(titles: Sequence[str]) -> list[tuple[str, str]]:
     """Return names and units: "x [mm]" has a unit, "q[0]" beside "q[1]", or "thrust[2]", an index."""
-    parts = [title[:-1].partition("[") if title.endswith("]") else (title, "", "") for title in titles]
+    parts = [title[:-1].rpartition("[") if re.search(r"\[.*]$", title) else (title, "", "") for title in titles]
     names = [name for name, _, _ in parts]
     return [
         (title, "") if unit.isdigit() and (names.count(name) > 1 or unit != "1") else (name.strip(), unit.strip())

@@ -55,9 +55,10 @@ def calibrate(
     than with the robot's file. --fix corrects input errors of the log.
     """
     from ..estimation.calibration import calibrate as find
-    from ..estimation.calibration.correction import correction_of, realigned
+    from ..estimation.calibration.correction import correction_of
     from ..estimation.calibration.solving import usual
     from ..estimation.logs import read_log
+    from ..estimation.logs.clocks import realigned
     from ..models import load
 
     names = None if free is None else [name.strip() for name in free.split(",")]

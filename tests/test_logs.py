@@ -113,6 +113,7 @@ NAMES = {
         "tether_4_length",
         "rho_1",
         *("motor1_pos", "winch_position_2", "Axis1.ActPos", "angle_1", "payout_1", "w1_length"),
+        *("MAIN.fbAxis[1].nIncr", "GVL.fLength1", "Winde 1 Länge"),
     ],
     "tensions": [
         "tension0",
@@ -125,17 +126,17 @@ NAMES = {
         "/loadcell_1/wrench.force.z",
         "/winch_3/ft/wrench.force.z",
         "/force_sensor_2/data/force/z",
-        *("lc1_kg", "lc2_fz"),
+        *("lc1_kg", "lc2_fz", "Seilkraft 2"),
     ],
     "position": [
         *("x", "pos_y", "position.z", "/mocap/pose.position.x", "field.pose.position.y", "px", "translation.z"),
         *("x_gt", "actual_y", "ground_truth_z", "x_mocap", "tcp_x", "Global Angle:platform/TX"),
-        *("position[2]", "PN", "drone1.pos_d", "east", "mocapX", "LocalX"),
+        *("position[2]", "PN", "drone1.pos_d", "east", "mocapX", "LocalX", "Mocap/Position(1)"),
     ],
-    "quaternion": ["qx", "q_w", "quat_z", "/mocap/pose.orientation.w", "rotation.x", "orientation_y"],
+    "quaternion": ["qx", "q_w", "quat_z", "/mocap/pose.orientation.w", "rotation.x", "orientation_y", "Mocap/Quat(4)"],
     "angles": ["roll", "Yaw", "/imu/pitch", "roll_gt", "pitch (degrees)", "ry_deg", "EulerX", "rpy[2]", "imu_roll"],
     "thrusts": ["thrust_1", "/uav2/thrust_estimate/data", "quad1.thrust_measured", "thrust_cmd", "ThO"],
-    "thrust_vectors": ["thrust_x", "uav1/thrust.vector.y", "quad_2_thrust_z"],
+    "thrust_vectors": ["thrust_x", "uav1/thrust.vector.y", "quad_2_thrust_z", "/uav1/thrust/wrench.force.z"],
     "time": [
         "t",
         "time",
@@ -147,6 +148,7 @@ NAMES = {
         "t_sec",
         "sim_time",
         "time (milliseconds)",
+        *("tout", "Zeit"),
     ],
     None: [
         "vx",
@@ -172,6 +174,7 @@ def test_axes_with_other_names():
     """North, east, down and position[0] to [2] are x, y, z; rx, ry, rz without rw are angles; eight are no position."""
     for names, turned in (
         (["PN", "PE", "PD"], ["Roll", "Pitch", "Yaw"]),
+        (["Mocap/Position(1)", "Mocap/Position(2)", "Mocap/Position(3)"], ["phi", "theta", "psi"]),
         (["position[0]", "position[1]", "position[2]"], ["rx", "ry", "rz"]),
         (["east", "north", "up"], ["euler_x", "euler_y", "euler_z"]),
     ):

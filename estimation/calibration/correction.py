@@ -1,19 +1,14 @@
-"""`corrected`, `correction_of`, `realigned`: a log and its robot without the probable input errors of the log."""
+"""`corrected`, `correction_of`: a log and its robot without the probable input errors of the log."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from ...base.errors import InputError
-from ...models import points
 from ...models.cable import Encoder
 from ...models.files import as_robot
 from ...models.robot import Robot
-from ..logs.alignment import Clock
-from ..logs.clocks import aligned
-from ..logs.measurements import Measurements, changed, measured_poses, tracked
-from ..logs.pose_track import PoseTrack, unit_quaternions
-from ..logs.recording import Samples
+from ..logs.measurements import Measurements
 from .interpretations import FACTORS
 from .parameters import Parameters
 from .plausibility import mistake
@@ -65,27 +60,6 @@ def correction_of(robot: Robot, measurements: Measurements) -> Correction:
         measurements = found.corrected.with_lengths(found.corrected.lengths / sizes)
         robot = _scaled(robot, sizes)
     return Correction(robot, measurements, texts, counted)
-
-
-def realigned(robot: Robot, measurements: Measurements) -> tuple[Measurements, Clock | None]:
-    """Return measurements at the times of poses by the clock that their cable speeds show now, and this clock.
-
-    Cable speeds of poses in a wrong frame hardly show the rate of a clock. Nothing changes, and the clock is None,
-    without times, with moving carriers, or if lengths and poses have too little in common.
-    """
-    times, poses, known = measurements.times, measurements.poses, tracked(robot, measurements)
-    if times is None or poses is None or measurements.carrier_poses is not None or known.sum() < 4:
-        return measurements, None
-    turns = unit_quaternions(poses[:, 3:]) if np.isfinite(poses[:, 3:]).any() else None
-    try:
-        clock = aligned(Samples(times, measurements.lengths), Samples(times, poses[:, :3]), turns, robot, None, [])
-    except InputError:
-        return measurements, None
-    position, rotation, _ = measured_poses(robot, measurements)
-    track = PoseTrack((times - clock.offset) / clock.rate, position, rotation, known).at_times(times)
-    position, rotation = track.at(0.0)[:2]
-    moved = np.where(np.isfinite(poses), np.hstack([position, points.angles(rotation)]), np.nan)
-    return changed(measurements, poses=moved).only(track.inside(0.0)), clock
 
 
 def _scaled(robot: Robot, factors: np.ndarray) -> Robot:

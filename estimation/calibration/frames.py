@@ -13,13 +13,15 @@ from scipy.spatial.transform import Rotation
 
 from ...base.text import quantity, quantity_row
 from ...models import points
-from .differences import LogPart
+from .differences import AS_GIVEN, LogPart
 from .geometry import runs
+from .interpretations import Interpretation, interpretations
 
 FEW, MANY = 6, 60  # steps of a first and of a last descent
 KEPT = 8  # starts that are worth a last descent
 MOST_SAMPLES = 60
 SIMPLER = 1.3  # times the size of the residuals that one transform instead of two may have
+MUCH_BETTER = 2.0  # times smaller residuals, in another convention of angles
 DAMPING, ROUNDING = 1e-3, 1e-14
 
 
@@ -69,6 +71,21 @@ def fitted_frames(log: LogPart) -> Frames:
         starts += [Frames(outer, NONE), Frames(outer, (np.zeros(3), (turn @ mean).T @ home))]
     tried = sorted(_descended(few, starts, BOTH, FEW), key=lambda one: one.size)[:KEPT]
     return _simplest(few, min(_descended(few, tried, BOTH, MANY), key=lambda one: one.size))
+
+
+def in_convention(log: LogPart, frames: Frames) -> tuple[Frames, Interpretation]:
+    """Return frames with the convention of angles in which they fit a log much better, or these if there is none."""
+    few, home = _few(log), points.rotations(log.robot.home[3:])
+    tried: list[tuple[float, Interpretation]] = []
+    for way in interpretations(True):
+        if way.turned is not None and way.placed is AS_GIVEN.placed:
+            rotation = few.at(way)[1]
+            inner = (frames.outer[1] @ Rotation.from_matrix(rotation).mean().as_matrix()).T @ home
+            start = Frames(frames.outer, (np.zeros(3), inner))
+            tried.append((_descended(few._replace(rotation=rotation), [start], BOTH, FEW)[0].size, way))
+    way = min(tried, key=lambda one: one[0])[1]
+    found = fitted_frames(log._replace(rotation=log.at(way)[1]))
+    return (found, way) if MUCH_BETTER * found.size < frames.size else (frames, AS_GIVEN)
 
 
 def displaced_frames(log: LogPart, least: float, noise: float) -> tuple[Frames, float] | None:
@@ -165,11 +182,11 @@ def _residuals(log: LogPart, frames: Sequence[np.ndarray]) -> tuple[np.ndarray, 
     e = run.lengths.reshape(shape).swapaxes(0, 1) - (0.0 if log.counted else log.y.T)
     unknown = ~np.isfinite(e + J.sum(axis=3))
     e[unknown], J[unknown] = 1e3, 0.0
-    e -= np.median(e, axis=2, keepdims=True)
     J -= J.mean(axis=2, keepdims=True)
     if log.counted:
         y = log.y - log.y.mean(axis=0)
         y /= np.maximum(np.linalg.norm(y, axis=0), 1e-300)
         e -= np.einsum("smn,nm->sm", e, y)[..., None] * y.T
         J -= np.einsum("smnk,nm->smk", J, y)[:, :, None] * y.T[..., None]
+    e -= np.median(e, axis=2, keepdims=True)
     return e.reshape(len(t), -1), J.reshape(len(t), -1, 12)

@@ -23,10 +23,11 @@ from ...base.text import quantity
 from ...models import points
 from ...models.files import as_robot
 from ...models.robot import Robot
+from ..logs.clocks import LIKE, SURELY, realigned
 from ..logs.measurements import Measurements, changed, check_measurements, measured_poses, tracked
 from .attitudes import misread_attitudes
-from .differences import AS_GIVEN, FEWEST, LogPart, medians
-from .frames import Frames, displaced_frames, fitted_frames
+from .differences import AS_GIVEN, FEWEST, PLAUSIBLE, LogPart, medians
+from .frames import Frames, displaced_frames, fitted_frames, in_convention
 from .geometry import length_of
 from .interpretations import FACTORS, Interpretation, interpretations
 from .parameters import Parameters
@@ -92,35 +93,41 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     parameters = Parameters(robot, ())
     table = parameters.table(parameters.first)
     position, rotation, known = measured_poses(robot, given)
-    rows = np.flatnonzero(tracked(robot, given))
     carriers = given.carrier_poses
     framed = carriers is None and bool((known.any(axis=0) | (robot.dof_mask == 0))[3:].all())
-    if len(rows) > MOST_SAMPLES:
-        rows = rows[np.linspace(0, len(rows) - 1, MOST_SAMPLES).astype(int)]
-    readings = given.lengths * table[:, 7]
-    if len(rows) < 4:
-        attitudes = misread_attitudes(robot, given)
-        return Mistake(*attitudes) if attitudes else _too_large(robot, given, readings)
     angles = points.angles(rotation) if given.poses is None else np.where(known[:, 3:], given.poses[:, 3:], 0.0)
-    sigma = given.sigma.lengths
-    seen = None if carriers is None else carriers[rows]
-    log = LogPart(robot, table, position[rows], rotation[rows], angles[rows], readings[rows], sigma, seen)
-    log, e = log.sound()
+    if tracked(robot, given).sum() < 4:
+        attitudes = misread_attitudes(robot, given)
+        return Mistake(*attitudes) if attitudes else _too_large(robot, given, given.lengths * table[:, 7])
+    log, e = _samples(robot, given, table).sound()
+    if not _is_noise(log, e):
+        # The clock of the poses may be ahead, which another frame or convention does not explain.
+        moved, clock = realigned(robot, given)
+        if clock is not None and clock.likeness > LIKE and abs(clock.offset) > SURELY * clock.sigma:
+            log, e = _samples(robot, moved, table).sound()
     order, e = np.arange(robot.m), e[:, : len(log.y)]
-    noise = sigma * np.sqrt(1 + BY_CHANCE * np.sqrt(2 / e.size))
-    if max(map(_root_mean_square, e)) <= sigma * np.sqrt(1 + BY_CHANCE * np.sqrt(2 / len(log.y))):
+    noise = log.sigma * np.sqrt(1 + BY_CHANCE * np.sqrt(2 / e.size))
+    if _is_noise(log, e):
         return _displaced(log, given, noise) if framed else None
+    turns = bool(np.ptp(log.angles, axis=0).any()) and robot.dof_mask.sum() == 6  # with one angle, others would fit
     ways, as_given = _explanations(log, e, noise)
     best = min((way for way in ways if way.text), key=lambda way: way[:2])
     change = float(np.median(np.abs(log.y - np.median(log.y, axis=0))))
     named = best.weighted < as_given and best.size < EXPLAINED * change
     far = best.size * best.way.factor > FAR * noise if named else as_given > EXPLAINED * change
+    whole = log._replace(position=position, rotation=rotation, angles=angles, carriers=carriers)
     if far and framed and len(log.y) >= FEWEST[1]:
-        part = log
+        part, read = log, AS_GIVEN
         for step in range(LAST_STEP + 1):
-            frames = fitted_frames(part._replace(counted=step == 1))
-            moved = frames.of(position, rotation)
-            placed = frames.of(log.position, log.rotation)
+            part = part._replace(counted=step == 1)
+            if step < 2:
+                frames, read = fitted_frames(part), AS_GIVEN
+                if turns and frames.size > FAR * noise:
+                    frames, read = in_convention(part, frames)
+            else:  # with scales that are known, the frames are found more exactly
+                frames = fitted_frames(part)
+            moved = frames.of(position, whole.at(read)[1])
+            placed = frames.of(log.position, log.at(read)[1])
             there, left = log._replace(position=placed[0], rotation=placed[1]).sound()
             size = _rms(medians(left, len(there.y)))
             way = _Way(VERY_CLEARLY * size, size, "", AS_GIVEN, order, np.ones(robot.m))
@@ -128,14 +135,13 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
                 others = (one for one in _explanations(there, left[:, : len(there.y)], noise)[0] if one.way.of_readings)
                 way = min(others, default=way, key=lambda one: one.weighted)
             left_before, factors = min(as_given, best.size * best.way.factor), way.signs * way.way.factor
-            if step and step < LAST_STEP:  # with scales that are known, the frames are found more exactly
-                part = log._replace(y=log.y[:, way.columns] * factors)
+            if step and step < LAST_STEP:
+                part = log._replace(y=log.y[:, way.columns] * factors, rotation=log.at(read)[1])
             elif way.weighted * way.way.factor < left_before and way.size < EXPLAINED * change:
                 text = _in_frame(frames._replace(size=way.size), as_given)
-                text = f"{way.text}, and {text}" if way.text else text
+                text = ", and ".join(filter(None, (way.text, read.text, text)))
                 return Mistake(text, _corrected(given, *moved, None, way.columns, factors), factors=factors)
     if named:
-        whole = log._replace(position=position, rotation=rotation, angles=angles, carriers=carriers)
         factors = best.signs * best.way.factor
         # Fitted scales reduce the differences of any log; the remainder may be due to a wrong explanation.
         rival = min((way for way in ways if way.text not in ("", best.text)), default=best, key=lambda way: way[:2])
@@ -178,17 +184,47 @@ def _corrected(
 
 
 def _displaced(log: LogPart, given: Measurements, noise: float) -> Mistake | None:
-    """Return a frame near the file's in which the poses agree much better with the readings up to offsets, or None."""
-    if log.robot.m < MANY_CABLES or len(log.y) < FEWEST[1] or log.robot.dof_mask.sum() < 6:
+    """Return a frame near the file's in which the poses agree much better with the readings up to offsets, or None.
+
+    It is an input error if, of another body, it would move the ends of cables farther than a file may be wrong.
+    """
+    robot = log.robot
+    if len(log.y) < FEWEST[1] or robot.dof_mask.sum() < 6:
         return None
-    least = DISPLACED if log.robot.m > MANY_CABLES else 3 * DISPLACED
-    found = displaced_frames(log, least, noise)
+    found = displaced_frames(log, DISPLACED, noise)
     if found is None:
         return None
-    frames, before = found
-    position, rotation, _ = measured_poses(log.robot, given)
-    corrected = _corrected(given, *frames.of(position, rotation), None, np.arange(log.robot.m), 1.0)
-    return Mistake(_in_frame(frames, before), corrected, severe=False)
+    frames, before = min(found[0], fitted_frames(log), key=lambda one: one.size), found[1]
+    if robot.m <= MANY_CABLES and before < DISPLACED**2 * max(frames.size, noise):
+        placed = frames.of(log.position, log.rotation)
+        sizes = [
+            _rms(medians(one.sound(0)[1], len(one.y)))
+            for one in (log, log._replace(position=placed[0], rotation=placed[1]))
+        ]
+        if sizes[0] < VERY_CLEARLY * sizes[1]:
+            return None  # displaced ends of cables are as plausible
+    position, rotation, _ = measured_poses(robot, given)
+    corrected = _corrected(given, *frames.of(position, rotation), None, np.arange(robot.m), 1.0)
+    shift, turn = frames.inner
+    moved = np.linalg.norm(robot.attachments @ (turn - np.eye(3)).T + shift, axis=1).max()
+    return Mistake(_in_frame(frames, before), corrected, severe=bool(moved > PLAUSIBLE * length_of(robot)))
+
+
+def _samples(robot: Robot, given: Measurements, table: np.ndarray) -> LogPart:
+    """Return some samples of measurements, those with poses."""
+    rows = np.flatnonzero(tracked(robot, given))
+    rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), MOST_SAMPLES)).astype(int)]
+    part = given.only(rows)
+    position, rotation, known = measured_poses(robot, part)
+    angles = points.angles(rotation) if part.poses is None else np.where(known[:, 3:], part.poses[:, 3:], 0.0)
+    y = part.lengths * table[:, 7]
+    return LogPart(robot, table, position, rotation, angles, y, given.sigma.lengths, part.carrier_poses)
+
+
+def _is_noise(log: LogPart, e: np.ndarray) -> bool:
+    """Return whether differences e (m, N + c) of a log are as small as the stated standard deviation of lengths."""
+    limit = log.sigma * np.sqrt(1 + BY_CHANCE * np.sqrt(2 / len(log.y)))
+    return bool(max(map(_root_mean_square, e[:, : len(log.y)])) <= limit)
 
 
 def _explanations(log: LogPart, e: np.ndarray, noise: float) -> tuple[list[_Way], float]:

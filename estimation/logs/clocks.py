@@ -15,7 +15,9 @@ from .cable_directions import vectors
 from .carrier_poses import angles_at, carriers_at
 from .encoders import locked
 from .mapping import Field, LogMap, carrier_fields
+from .measurements import Measurements, changed, measured_poses, tracked
 from .north_east_down import from_ned, ned_frame, platform_from_ned
+from .pose_track import PoseTrack, unit_quaternions
 from .recording import Recording, Samples, check_rising
 from .streams import Reader, at_times
 
@@ -122,6 +124,27 @@ def aligned(
     return align(lengths.times[complete], lengths.values[complete], position.times[rows], along, effects)
 
 
+def realigned(robot: Robot, measurements: Measurements) -> tuple[Measurements, Clock | None]:
+    """Return measurements at the times of poses by the clock that their cable speeds show now, and this clock.
+
+    Cable speeds of poses in a wrong frame hardly show the rate of a clock. Nothing changes, and the clock is None,
+    without times, with moving carriers, or if lengths and poses have too little in common.
+    """
+    times, poses, known = measurements.times, measurements.poses, tracked(robot, measurements)
+    if times is None or poses is None or measurements.carrier_poses is not None or known.sum() < 4:
+        return measurements, None
+    turns = unit_quaternions(poses[:, 3:]) if np.isfinite(poses[:, 3:]).any() else None
+    try:
+        clock = aligned(Samples(times, measurements.lengths), Samples(times, poses[:, :3]), turns, robot, None, [])
+    except InputError:
+        return measurements, None
+    position, rotation, _ = measured_poses(robot, measurements)
+    track = PoseTrack((times - clock.offset) / clock.rate, position, rotation, known).at_times(times)
+    position, rotation = track.at(0.0)[:2]
+    moved = np.where(np.isfinite(poses), np.hstack([position, points.angles(rotation)]), np.nan)
+    return changed(measurements, poses=moved).only(track.inside(0.0)), clock
+
+
 class Seen(NamedTuple):
     """Times (N,) [s] and poses (N, 6) of the platform, with the cable lengths up to offsets, (N, m) [m]."""
 
@@ -172,7 +195,15 @@ def set_clocks_of_carriers(
             seen = seen._replace(poses=np.asarray(platform_from_ned(robot, seen.poses, axis)))
             tracks = {index: one._replace(poses=from_ned(one.poses, axis)) for index, one in tracks.items()}
         ways = [seen]
-    tried = [{index: _offset(robot, index, tracks[index], way) for index in others} for way in ways]
+    tried: list[dict[int, tuple[float, float]]] = []
+    for number, way in enumerate(ways):
+        tried.append({})
+        for index in others:
+            own = [] if seen is not None else _seen_from(robot, index, tracks[index], all_, given)
+            arms = [robot.home_attachments[list(robot.carrier_of_cable).index(i)] for i in (index, first)]
+            shift = np.pad(arms[0] - arms[1], (0, 3))  # from poses, by the attitude at home, to the ends of cables
+            ends = own[number]._replace(poses=own[number].poses + shift) if len(own) == len(ways) else None
+            tried[-1][index] = _offset(robot, index, tracks[index], way, ends)
     notes: list[str] = []
     for index, (offset, _) in min(tried, key=lambda one: sum(left for _, left in one.values())).items():
         tracks[index].source.ahead = offset
@@ -225,21 +256,29 @@ def _lasting(times: np.ndarray) -> np.ndarray:
     return np.asarray(np.abs(times - np.median(np.nan_to_num(times))) <= LONGEST)
 
 
-def _offset(robot: Robot, index: int, track: _Track, seen: Seen) -> tuple[float, float]:
-    """Return by how much the clock of a carrier is ahead [s], 0 if that is not clear, and the spread of lengths [m]."""
+def _offset(robot: Robot, index: int, track: _Track, seen: Seen, own: Seen | None = None) -> tuple[float, float]:
+    """Return by how much the clock of a carrier is ahead [s], 0 if that is not clear, and the spread of lengths [m].
+
+    If directions of its cable show the platform too, `own`, the distance between the ends of both cables is constant.
+    """
     from scipy.optimize import minimize_scalar
 
-    times, poses = track.times, track.poses
     cables = np.flatnonzero(np.asarray(robot.carrier_of_cable) == index)
     rows = np.flatnonzero(np.isfinite(seen.poses[:, :3]).all(axis=1) & _lasting(seen.times))
     if not len(rows) or not len(cables):
         return 0.0, 0.0
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, MOST_COMPARED).astype(int))]
     turned = np.isfinite(seen.poses[rows, 3:])
-    angles = np.where(turned, seen.poses[rows, 3:], robot.home[3:])
-    clearly = CLEARLY if turned.all() or not robot.dof_mask[3:].any() else VERY_CLEARLY
-    ends = seen.poses[rows, None, :3] + robot.attachments[cables] @ np.swapaxes(points.rotations(angles), 1, 2)
-    starts = poses[:, None, :3] + robot.anchors[cables] @ np.swapaxes(points.rotations(poses[:, 3:]), 1, 2)  # (K, c, 3)
+    if own is None:
+        times, poses, lengths = track.times, track.poses, seen.lengths[:, cables]
+        angles = np.where(turned, seen.poses[rows, 3:], robot.home[3:])
+        clearly = CLEARLY if turned.all() or not robot.dof_mask[3:].any() else VERY_CLEARLY
+        ends = seen.poses[rows, None, :3] + robot.attachments[cables] @ np.swapaxes(points.rotations(angles), 1, 2)
+        starts = poses[:, None, :3] + robot.anchors[cables] @ np.swapaxes(points.rotations(poses[:, 3:]), 1, 2)
+    else:  # both show the ends of cables, up to constant vectors
+        known = np.isfinite(own.poses[:, :3]).all(axis=1)
+        times, lengths, clearly, cables = own.times[known], np.zeros((len(seen.times), 1)), CLEARLY, cables[:1]
+        starts, ends = own.poses[known, None, :3], seen.poses[rows, None, :3]
     flat = starts.reshape(len(starts), -1).T
 
     def spread(offset: float) -> float:
@@ -249,7 +288,7 @@ def _offset(robot: Robot, index: int, track: _Track, seen: Seen) -> tuple[float,
             return np.inf
         moved = np.stack([np.interp(at[inside], times, column) for column in flat], axis=1)
         apart = np.linalg.norm(moved.reshape(-1, len(cables), 3) - ends[inside], axis=2)
-        return float((apart - seen.lengths[rows][inside][:, cables]).std(axis=0).mean())
+        return float((apart - lengths[rows][inside]).std(axis=0).mean())
 
     low, high = times[0] - seen.times[rows[-1]], times[-1] - seen.times[rows[0]]
     step = float(np.clip((high - low) / MOST_TRIED, STEP, LONGEST_STEP))

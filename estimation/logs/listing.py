@@ -30,6 +30,7 @@ def listing(recordings: Sequence[Recording], given: LogMap | None = None, robot:
         found = fields_of(recordings, given, None if robot is None else robot.m, moving, free_axes(robot))
         for name in moving:
             of = carrier_fields(recordings, given, name)
+            found = found._replace(directions=found.directions or of.directions)
             others[name] = [one.label for one in (*of.position, *of.orientation, *of.thrusts, *of.directions)]
         if given and given.thrusts and robot is not None:
             others["thrusts"] = [one.label for one in command_fields(recordings, given, robot.m).thrusts]

@@ -253,8 +253,8 @@ def _usual(
             if (others := next((one for one in OTHER_AXES if set(by_name) == set(one)), None)) is not None:
                 by_name = {axis: by_name[other] for axis, other in zip(AXES[kind], others, strict=True)}
             axes = tuple(axis for axis in AXES[kind] if axis in free.split())
-            if kind == "angles" and len(axes) == len(by_name) == 1:  # a planar robot has one angle, whatever its name
-                by_name = dict(zip(axes, by_name.values(), strict=True))
+            if kind in ("angles", "position") and 0 < len(axes) == len(by_name) < 3:  # of a planar robot, in any plane
+                by_name = dict(zip(axes, (by_name[name] for name in sorted(by_name)), strict=True))
             axes = axes if set(axes) == set(by_name) else AXES[kind]
             missing = set(axes) - set(by_name)
             greek = GREEK.search(members[0][1].name) is not None  # which have other meanings too

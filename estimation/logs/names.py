@@ -11,8 +11,10 @@ from ...base.csv_columns import ANGLES, LENGTHS, TIMES
 FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3, "kgf": 9.80665, "kg": 9.80665, "gf": 9.80665e-3, "g": 9.80665e-3}
 FORCES["lbf"] = 4.4482216152605
 NUMBERS = {"1": 1.0, "-": 1.0}
+# What turns of a drum are counted in; the scale of its encoder is in metres per unit of the reading.
+COUNTS = dict.fromkeys(("rev", "turns", "counts", "ticks"), 1.0)
 UNITS = {
-    "lengths": LENGTHS,
+    "lengths": {**LENGTHS, **ANGLES, **COUNTS},
     "tensions": FORCES,
     "efforts": FORCES,
     "position": LENGTHS,
@@ -35,12 +37,13 @@ _BODY += r"|(?:vehicle[_ ]?)?local(?:[_ ]?position)?)"
 _DIRECTION = r"(?:dir(?:ection)?s?|(?:unit[_ ]?)?vec(?:tor)?s?|unit)"
 _CABLE = r"(?:cable|rope|wire|tether|winch|c)s?[_ ./]?\[?(?:cable )?(\d+)\]?"
 _DRUM = r"(?:cable|rope|wire|tether|winch(?:e?s)?|motor|axis|ax|drive|drum|encoder|enc|joint|actuator|[cmw])s?"
-_WINCH = rf"{_DRUM}[./_ ]?(\d+)[./_ ]"
-TURNED = r"(?:act(?:ual)?)?(?:positions?|pos|angles?|theta|counts?|ticks?)"  # what the sensor of a drum's motor reads
+_WINCH = rf"{_DRUM}[./_ ]?\[?(\d+)\]?[./_ ]"
+# What the sensor of a drum's motor reads.
+TURNED = r"(?:act(?:ual)?)?(?:positions?|pos|angles?|theta|counts?|ticks?|incr(?:ements?)?)"
 _SENSOR = r"(?:load[_ ]?cell|lc|cable|rope|wire|winch|tension|force[_ ]?sensor|ft)"
 _NO_LENGTH = re.compile(r"tension|force|effort|speed|veloc|vel_|accel|current|torque|thrust|temp|status|error")
-_SENSED = r"(?:[./_ ](?:data|value|estimated?|est|measured?|total|norm(?:ali[sz]ed)?|cmd|command|setpoint|body))*"
-_VECTOR = r"(?:[./_ ](?:vector|data|value))*[./_ ]?\[?([xyz])\]?"
+_SENSED = r"(?:[./_ ](?:data|value|estimated?|est|measured?|total|norm(?:ali[sz]ed)?|cmd|command|setpoint|body|xyz))*"
+_VECTOR = r"(?:[./_ ](?:vector|data|value|wrench|force))*[./_ ]?\[?([xyz])\]?"
 # The groups are what tells the fields of a role apart: the cable's number or name, the axis, or both.
 PATTERNS = {
     "lengths": (
@@ -49,7 +52,8 @@ PATTERNS = {
         rf"{_BEFORE}{_OF}lengths?[./_ ](?:data|values?|position)[\[.](\d+)\]?",
         rf"{_BEFORE}{_WINCH}(?:[a-z]+[./_ ])?(?:cable|rope|wire)?[_ ]?(?:len|lengths?)(?:[./_ ](?:data|value))*",
         r"field\.position(\d+)",  # of a JointState that `rostopic echo -p` wrote
-        r".*/position\[[^\]]*?(\d+)(?:[_ ][^\]0-9]+)?\]",  # also of winch_1_joint
+        # Also of winch_1_joint.
+        r"(?!.*(?:mocap|vicon|optitrack|qualisys)).*/position\[[^\]]*?(\d+)(?:[_ ][^\]0-9]+)?\]",
         r".*/joints\[[^\]]*?(\d+)\]\.position",
         rf"{_BEFORE}{_WINCH}(?:[a-z]+[./_ ])*{TURNED}",
         rf"{_BEFORE}(?:{_DRUM}[_ ]?{TURNED}|angles?|theta){_NUMBER}",
@@ -98,7 +102,7 @@ PATTERNS = {
         rf"{_BEFORE}{_OF}(?:dir(?:ection)?[_ ])?(azimuth|elevation|swivel)[_ ]?\[?(\d*)\]?",
     ),
     "time": (
-        r"(?:.*/)?[%_]*(t|ts|(?:ros|sim|log|recv|rec|unix|host|hw|sys|sample|date)?[_ ]?times?"
+        r"(?:.*/)?[%_]*(t|ts|tout|(?:ros|sim|log|recv|rec|unix|host|hw|sys|sample|date)?[_ ]?times?"
         r"|time_?us(?:ec)?|time_?boot|secs?|seconds)",
         rf"[%_]*({_BEFORE}(?:rosbag)?(?:time[_ ]?)?stamp)",
         r"(epoch|elapsed(?:[_ ]time)?|(?:sys(?:tem)?[_ ]?)?(?:ticks?|clock|uptime))",
@@ -107,6 +111,7 @@ PATTERNS = {
 }
 DATES = 1e9, 4e9  # [s] from 1970, of recordings: 2001 to 2096
 LEAST_COUNTED, SLOWEST = 100.0, 0.5  # step of times that are no seconds; time between samples [s]
+MANY, LONG = 500, 3600.0  # samples, and [s] that so many would take, of a recording in milliseconds
 # What is commanded rather than measured: cmd_l0, length_0_ref, /winch_commands/position[0].
 _COMMAND = re.compile(
     r"[./_ ]?(?:cmd|commands?|commanded|desired|setpoints?|targets?|refs?|references?"
@@ -128,6 +133,11 @@ ANGLE_OF: dict[str, str] = dict(zip("xyz012", 2 * ("roll", "pitch", "yaw"), stri
 ANGLE_OF |= {"phi": "roll", "theta": "pitch", "psi": "yaw", "heading": "yaw"}
 
 
+# Names of PLCs begin with a type (fbAxis), those of Simulink count from 1 (Quat(4)), and some are German.
+_TYPE, _INDEX = re.compile(r"(?<![A-Za-z])(?:fb|st|lr|[afinr])(?=[A-Z][a-z])"), re.compile(r"(?<=[a-z])\((\d+)\)")
+_GERMAN = {"zeit": "time", "stempel": "stamp", "winde": "winch", "seil": "cable", "kraft": "force", "länge": "length"}
+
+
 class Role(NamedTuple):
     """Role of a field, which of its fields it is, the name with "#" in place of that, and a unit in the name.
 
@@ -145,7 +155,9 @@ def role(name: str, stated: str = "") -> Role | None:
 
     `stated` is its unit, if there is one beside the name: `rx [deg]` is an angle, and `rx` is of a quaternion.
     """
-    low = name.lower().lstrip(". ")
+    low = _INDEX.sub(lambda found: f"[{int(found[1]) - 1}]", _TYPE.sub("", name).lower().lstrip(". "))
+    for word, english in _GERMAN.items():
+        low = low.replace(word, english)
     texts = [(low, "")]
     if found := _SUFFIX.fullmatch(low):
         texts.append((found[1], unit_of(found[2])))
@@ -203,13 +215,13 @@ def dated_unit(times: np.ndarray) -> str | None:
 def time_unit(times: np.ndarray) -> str:
     """Return the unit of times (N,) without one: by their size if they count from 1970, whole numbers by their steps.
 
-    A recording has two samples per second or more: 1000 is a step of 1 kHz in us, not of 1 Hz in ms. Steps that are
-    smaller are in seconds.
+    A recording has two samples per second or more: 1000 is a step of 1 kHz in us, not of 1 Hz in ms. Smaller steps are
+    in seconds, unless the recording would be long: 500 samples in an hour or more are in milliseconds.
     """
     known = times[np.isfinite(times)]
     if (dated := dated_unit(known)) is not None:
         return dated
     step = float(np.median(np.diff(known))) if len(known) > 1 else 0.0
-    if step < LEAST_COUNTED or (known % 1).any():
+    if (known % 1).any() or (step < LEAST_COUNTED and (len(known) < MANY or np.ptp(known) < LONG)):
         return "s"
     return next((unit for unit in ("ms", "us") if step * TIMES[unit] <= SLOWEST), "ns")
