@@ -144,8 +144,8 @@ def spoiled(what):
 
 
 FAULTS = {
-    "no unit": "the unit of l2 must be one of m, dm, cm, mm, um, km, in, got ''",
-    "wrong unit": "the unit of l2 must be one of m, dm, cm, mm, um, km, in, got 'N'",
+    "no unit": "the unit of l2 must be one of m, dm, cm, mm, um, km, in, rad, .*, counts, ticks, got ''",
+    "wrong unit": "the unit of l2 must be one of m, dm, cm, mm, um, km, in, rad, .*, counts, ticks, got 'N'",
     "unknown column": "must have columns l0 to l6 without a gap, got no l2",
     "twice": "must have each column once, got l1 twice",
     "a name of another kind": "must have lengths under names of one kind, got l0, l1, l2, l3, l4, l5, l6 and length8",
