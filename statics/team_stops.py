@@ -27,9 +27,9 @@ from ..models.robot import Robot
 from ..models.trajectory import Motion, Trajectory
 from .continuation import RESTS, before, continued, faded, slopes
 
-SHORTEST, LONGEST = 0.1, 10.0  # of a stop [s], and over what it takes usually
+SHORTEST, LONGEST = 0.1, 10.0  # the shortest stop [s], and the longest one over a usual one
 ATTEMPTS, FIRST, USUAL = 8, 4, 2.5  # durations, how many are tried first, and the least of these, of sqrt(length / g)
-CLOSE = 1.1  # times the least excess: of stops that break limits, the shortest that is as good
+CLOSE = 1.5  # times the least excess: of stops that break limits, the shortest with less is taken
 LEAST = 1.7  # times that carriers need at their largest acceleration: the rate falls up to 2.2 times its mean
 COARSE, FINE, APART = 24, 150, 0.01  # instants of an attempt, and at most of the result; [s] between those, at least
 SMOOTHED = 0.03  # [s], over which tilt is smoothed: a plan's jerk jumps between its nodes
@@ -60,7 +60,7 @@ class TeamStop(NamedTuple):
 
 
 def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> TeamStop:
-    """Return the shortest stop inside the limits that is found, or the one that breaks them least.
+    """Return the shortest stop inside the limits that is found, or the shortest that breaks them nearly the least.
 
     A plan that ends at rest is followed to its end if no stop is shorter.
 

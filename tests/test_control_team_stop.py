@@ -137,6 +137,18 @@ def test_a_plan_that_ends_while_the_team_moves_goes_on_smoothly(made, together):
         np.testing.assert_allclose(carriers[1][-1, :, :3], np.tile(platform[1][-1, :3], (3, 1)), atol=1e-12)
 
 
+def test_a_stop_that_cables_are_too_weak_for_takes_no_half_minute(made):
+    """They cannot hold the load at rest either, so that a longer stop misses their limit by nearly as much."""
+    robot, found = made
+    cables = [
+        {**cable.model_dump(), "t_max": 0.8 * float(found.trajectory.tensions[-1].min())} for cable in robot.cables
+    ]
+    weak = Robot.model_validate({**robot.model_dump(), "cables": cables})
+    its = team_stop_along(weak, planned(found.trajectory.sel(time=slice(0.0, 1.2)))[1], 1.0)
+    assert its.limit.startswith("tension ")
+    assert its.times[-1] < 20 * np.sqrt(robot.fixed_lengths.max() / 9.81)
+
+
 def test_the_rest_of_a_plan_for_stronger_cables_is_no_feasible_stop(made):
     robot, found = made
     begins = found.duration - 0.15
