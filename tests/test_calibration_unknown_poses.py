@@ -113,16 +113,17 @@ def test_no_pose_of_a_platform_that_turns_far_is_left_in_another_valley(name, si
     assert squares.max() < chi2.ppf(1 - 1e-5, robot.m)
 
 
-def test_wrong_readings_do_not_hide_in_poses_and_parameters():
+@pytest.mark.parametrize(("seed", "share"), [(3, 0.01), (7, 0.1)])
+def test_wrong_readings_do_not_hide_in_poses_and_parameters(seed, share):
     """Four lengths of three coordinates tell which samples have a wrong reading, not which of the four it is."""
-    seed = 3
-    robot = shrunk("planar-4", 0.06)
+    robot = shrunk("planar-4", 0.06 if share < 0.1 else 0.3)
     built, offsets, _, readings = a_log(robot, seed, 0.4)
     draw = np.random.default_rng(seed)
-    wrong = draw.random(readings.shape) < 0.01
+    wrong = draw.random(readings.shape) < share
     readings = readings + wrong * draw.choice([-1, 1], wrong.shape) * draw.uniform(0.05, 0.3, wrong.shape)
     result = calibrate(robot, Measurements(readings), prior=PRIOR)
-    assert {one.sample for one in result.outliers} == set(np.flatnonzero(wrong.any(axis=1)).tolist())
+    found, true = {one.sample for one in result.outliers}, set(np.flatnonzero(wrong.any(axis=1)).tolist())
+    assert found == true if share < 0.1 else len(found ^ true) <= 4  # a few errors hardly show
     assert distance(result, built, offsets) < 1
 
 

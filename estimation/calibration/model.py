@@ -108,7 +108,7 @@ class Model(Displayed):
     parameters: Parameters
     measurements: Measurements
     prior: dict[str, float]
-    weights: np.ndarray  # which readings are used, not left out, (m, N) of bool
+    weights: np.ndarray  # which readings are used, (m, N) of bool, or factors of their residuals
     start: np.ndarray | None = None  # initial poses where none was measured, (N, 6) [m, rad]; default: home
     track: PoseTrack | None = None  # measured poses over time; default: the clock offset is 0
     upright: float = np.inf  # standard deviation of unmeasured orientations about their initial values [rad]; inf: none

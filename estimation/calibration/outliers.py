@@ -1,9 +1,9 @@
-"""Outliers and slipped winches, by statistical tests of the residuals (data snooping).
+"""Outliers and slipped winches, by a robust fit and statistical tests of its residuals.
 
 With unknown poses an error of one reading spreads over the residuals of its sample. The fraction that stays in its own
 residual is the redundancy r of the reading, between 0 and 1. The residual divided by sigma sqrt(r) is normally
-distributed, and the largest of a sample marks the outlier (Baarda). A slip changes the offset of a cable from one
-sample on. Cumulative sums test this additional parameter for every cable and sample at once.
+distributed (Baarda). A slip changes the offset of a cable from one sample on. Cumulative sums test this additional
+parameter for every cable and sample at once.
 """
 
 from dataclasses import replace
@@ -13,9 +13,9 @@ import numpy as np
 
 from ...models import points
 from ..logs.measurements import ARRAYS, changed
+from ..pose.estimate import largest_cost
 from ..pose.wrong_lengths import TOLD_APART
 from .fit import fit, held
-from .geometry import length_of
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
 from .parameters import Parameters
@@ -27,14 +27,17 @@ LEAST_THRESHOLD = 5.0  # sigmas; errors have longer tails than the normal distri
 SMALLEST_REDUNDANCY = 0.02  # a reading with less hardly shows its own errors
 SHORTEST = 5  # samples on each side of a slip
 CLEAR = 3.0  # a slip is at least this many times the other residuals of its cable
-MOST_LEVERAGED = 5000  # samples; of more, each has little influence on the parameters
 NEARLY = 0.3  # of the clearest slip's statistic, of another cable's that may be the true one
-MOST_CANDIDATES = 3
+MOST_CANDIDATES = 6
 WINDOW = 25  # samples on each side, over which a slip must be visible as a step
 VISIBLE = 0.5  # share of it that must be
 UNBALANCED = 1 - 1e-7  # share of sound samples whose forces are in better balance than those that are left out
-NEAR_LIMIT = 0.25  # of the largest residual: range below it in which the density of residuals is counted
-MOST_LOST = 0.5  # largest reduction of E psi'
+SOFT = 4.0  # sigmas at which a reading has a quarter of its weight
+SOFTER = 4.0  # factor of the square of this limit from one step to the next
+STEPS, ENOUGH = 3, 1e-2  # of the fit at each limit, and share of the sum of squares of a step that it need not take
+SOUND, SMALLER = 0.25, 0.3186  # share of the smallest errors, which are sound for certain, and their limit [sigmas]
+FALLS = 0.8  # times the last limit, by which it falls at least
+DOUBTFUL = 0.02  # share of sound samples that fit worse than the rest of one with a wrong reading may
 FORCES_BY_CHANCE = 0.1  # by which the noise of forces may differ from the stated one
 
 
@@ -84,17 +87,9 @@ def _limit(sizes: np.ndarray, count: int, known: int) -> float:
     return float(limits[beyond[-1]]) if beyond.size else first
 
 
-def by_left_out(model: Model, state: State) -> float:
-    """Return the factor by which leaving out readings that disagree increases the variances of parameters.
-
-    An M-estimator has the variance E psi^2 / (E psi')^2 with psi(e) = e up to a limit c and 0 beyond, for which E psi'
-    is smaller by c times the density of errors at +-c. A sample that is left out in part loses one redundant equation.
-    """
-    if model.weights.all():
-        return 1.0
-    size, redundancy, _ = _sizes(model, state)
-    near = np.sum(size.max(axis=0) > (1 - NEAR_LIMIT) * size.max()) if size.any() else 0
-    return float((1 - min(near / NEAR_LIMIT / max(float(redundancy[size > 0].sum()), 1.0), MOST_LOST)) ** -2)
+def _noise(sizes: np.ndarray) -> float:
+    """Return the standard deviation of sound errors from the sizes of all, (n,), in the stated one, at least 1."""
+    return max(1.0, float(np.quantile(sizes, SOUND)) / SMALLER) if sizes.size else 1.0
 
 
 def find_unbalanced(model: Model, state: State) -> tuple[float, np.ndarray] | None:
@@ -127,78 +122,130 @@ def find_unbalanced(model: Model, state: State) -> tuple[float, np.ndarray] | No
     return float(factor), tested & (squares > max(noise, 1e-12) * most)
 
 
-def _sizes(model: Model, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return sizes of residuals in standard deviations, 0 where unseen, redundancies and residuals, (m, N) each."""
-    found = project(model, state)
-    if len(state.shift) <= MOST_LEVERAGED and model.parameters.varies.any():
-        # Parameters, too, adapt to a wrong reading.
-        inverse = _inverse(model, state, found.equations, length_of(model.robot))
-        for part in parts(model, state, found.equations):
-            for i in range(model.robot.m):
-                rows, columns = part.without_poses(i)
-                found.redundancy[i, part.rows] -= quadratic_forms(rows, inverse[np.ix_(columns, columns)])
-    seen, size = found.redundancy > SMALLEST_REDUNDANCY, np.zeros_like(found.residuals)
-    size[seen] = np.abs(found.residuals[seen]) / np.sqrt(found.redundancy[seen])
-    return size, found.redundancy, found.residuals
+def robust(model: Model, state: State, length: float, rough: float = np.inf) -> tuple[State, np.ndarray]:
+    """Return the state that fits most readings, whatever the others are, and which readings fit there, (m, N) of bool.
+
+    Readings have the weights of Geman and McClure, with a limit that falls step by step from one beyond all residuals:
+    each minimum is near the one before (graduated non-convexity, Yang et al. 2020). Plain least squares would move
+    unknown poses and parameters towards wrong readings, until sound ones look wrong.
+
+    - `rough`: first limit, in the final ones, if the state is good enough for it.
+    """
+    passes: list[tuple[float, State, np.ndarray]] = []
+    for follows in (False, True):  # the noise that residuals show, or the stated one
+        begin, last = state, np.inf
+        while True:
+            found = project(model, begin)
+            squares = found.residuals**2 / np.maximum(found.redundancy, SMALLEST_REDUNDANCY)
+            if squares.max() <= _threshold(squares.size) ** 2:
+                return begin, model.weights
+            least = (SOFT * (_noise(np.sqrt(squares[model.weights])) if follows else 1.0)) ** 2
+            limit = max(least, min(last / SOFTER, rough * SOFT**2, float(squares.max())))
+            if limit > FALLS * last:
+                break
+            soft = replace(model, weights=model.weights * (limit / (limit + squares)))
+            begin, last = fit(soft, begin, length, STEPS, enough=ENOUGH).state, limit
+        fits = model.weights & (squares <= least)
+        passes.append((_unlikeliness(model, found.residuals**2, squares, fits), begin, fits))
+    return min(passes, key=lambda one: one[0])[1:]
+
+
+def _unlikeliness(model: Model, residuals: np.ndarray, squares: np.ndarray, fits: np.ndarray) -> float:
+    """Return twice the negative log-likelihood of sound readings with one noise, and wrong ones of any size.
+
+    Larger noise, or a wrong model, may leave few readings that fit the stated noise, and these by chance.
+
+    - `residuals`, `squares`: squared residuals, and over their redundancies; `fits`: which readings are sound, (m, N).
+    """
+    unknown, wrong = np.isinf(model.pose_sigmas).sum(axis=1), model.weights & ~fits
+    whole, left = (np.maximum(of.sum(axis=0) - unknown, 0) for of in (model.weights, fits))
+    noise = max(1.0, float(residuals[fits].sum()) / max(int(left.sum()), 1))
+    sound = float(residuals[fits].sum()) / noise + float(left.sum()) * np.log(noise)
+    if not wrong.any():
+        return sound
+    lost = whole - left
+    share = float(np.minimum(wrong.sum(axis=0), lost).sum()) / model.weights.sum()
+    spread = -share * np.log(max(share, 1e-9)) - (1 - share) * np.log(max(1 - share, 1e-9))
+    return sound + float(lost.sum()) * (1 + float(np.log(squares[wrong]).mean())) + 2 * model.weights.sum() * spread
 
 
 def find_outliers(model: Model, state: State) -> tuple[list[Outlier], np.ndarray]:
-    """Return outliers, at most one per sample, and the readings to leave out because of them, (m, N) of bool."""
-    size, redundancy, residuals = _sizes(model, state)
-    seen, left = size > 0, np.zeros(size.shape, dtype=bool)
-    if not seen.any():
-        return [], left
-    worst = np.argmax(size, axis=0)
-    samples = np.arange(size.shape[1])
-    known = int((~model.weights).any(axis=0).sum())
-    noise = max(1.0, 1.4826 * float(np.median(size[seen])))
-    limit = noise * _limit(size[worst, samples] / noise, int(seen.sum()), known)
-    # The smaller half may only be the echo of the larger in other samples, through the parameters.
-    wrong = samples[size[worst, samples] > max(limit, 0.5 * float(size.max()))]
-    if np.isinf(model.pose_sigmas[wrong]).any():
-        return [_attributed(model, state, int(k), left[:, k]) for k in wrong], left
-    sigma = model.measurements.sigma.lengths
-    left[worst[wrong], wrong] = True
-    return [
-        Outlier(int(i), int(k), float(-sigma * residuals[i, k] / redundancy[i, k]))
-        for i, k in zip(worst[wrong], wrong, strict=True)
-    ], left
+    """Return outliers, and the readings to leave out because of them, (m, N) of bool."""
+    found = project(model, state)
+    seen, redundancy = found.redundancy > SMALLEST_REDUNDANCY, np.maximum(found.redundancy, SMALLEST_REDUNDANCY)
+    size = np.where(seen, np.abs(found.residuals) / np.sqrt(redundancy), 0.0)  # in standard deviations
+    noise, known = _noise(size[seen]), int((~model.weights).any(axis=0).sum())
+    limit = noise * _limit(size.max(axis=0) / noise, int(seen.sum()), known)
+    left = size > limit
+    wrong = np.flatnonzero(left.any(axis=0))
+    if model.poses_vary[wrong].any():
+        return _attributed(model, state, wrong, limit, noise)
+    errors = -model.measurements.sigma.lengths * found.residuals / redundancy
+    return [Outlier(int(i), int(k), float(errors[i, k])) for i, k in zip(*left.nonzero(), strict=True)], left
 
 
-def _attributed(model: Model, state: State, sample: int, left: np.ndarray) -> Outlier:
-    """Return the wrong reading of a sample, and mark the readings to leave out in `left`, (m,) of bool.
+def _attributed(
+    model: Model, state: State, wrong: np.ndarray, limit: float, noise: float
+) -> tuple[list[Outlier], np.ndarray]:
+    """Return the wrong readings of samples (k,), and the readings to leave out because of them, (m, N) of bool.
 
-    It is the one whose removal gives the best fit: a large error moves an unknown pose so far that the residuals do not
-    show which reading is wrong. Others may explain the sample nearly as well. A wrong choice would leave an error that
-    is too small to be seen, so these are left out too, and the whole sample if the rest does not predict them.
+    They are those whose removal, one by one, gives the best fit: a large error moves an unknown pose so far that the
+    residuals do not show which reading is wrong. Where others explain a sample nearly as well, all of it is left out: a
+    wrong choice would leave an error that is too small to be seen.
     """
-    m, parameters = model.robot.m, Parameters(model.robot, ())
-    scales = parameters.table(state.x)[:, 7]
-    lengths = model.measurements.lengths[sample] + model.slips(state.x)[:, sample] / scales
+    m, outliers = model.robot.m, list[Outlier]()
+    used, chosen = model.weights[:, wrong].T.copy(), [list[tuple[int, float]]() for _ in wrong]
+    others: dict[int, np.ndarray] = {}
+    further, rows = False, np.arange(len(wrong))  # of the samples in which a further reading is wrong
+    while rows.size:
+        weights = (used[rows, None] & ~np.eye(m + 1, m, dtype=bool)).reshape(-1, m).T
+        without = _copies(model, state, np.repeat(wrong[rows], m + 1), weights)
+        found = fit(without, without.begin()._replace(x=state.x[: without.parameters.count].copy()), 1.0).state
+        of = without.residuals(found)
+        # Forces are far less certain in motion.
+        costs = (of.of_samples - (of.balance**2).sum(axis=1)).reshape(-1, m + 1)
+        with_all, costs = costs[:, m], costs[:, :m]
+        costs[~np.isfinite(costs) | ~used[rows]] = np.inf
+        every = replace(without, weights=np.ones_like(weights)).residuals(found).readings.T.reshape(-1, m + 1, m)
+        better = with_all - costs.min(axis=1) > limit**2
+        if further:  # of one wrong reading in a sample a second one is likely
+            spare = np.maximum(used[rows].sum(axis=1) - np.isinf(model.pose_sigmas[wrong[rows]]).sum(axis=1), 1)
+            better = with_all > noise**2 * np.array([largest_cost(int(one), DOUBTFUL) for one in spare])
+        further = True
+        rows, costs, every = rows[better], costs[better], every[better]
+        if not rows.size:
+            break
+        cables, best = np.argmin(costs, axis=1), costs.min(axis=1)
+        doubtful = costs <= best[:, None] + TOLD_APART**2
+        for row, cable, errors in zip(rows, cables, every, strict=True):
+            chosen[row].append((int(cable), float(-model.measurements.sigma.lengths * errors[cable, cable])))
+        used[rows] &= ~doubtful
+        several = doubtful.sum(axis=1) > 1
+        used[rows[several]] = False
+        others |= dict(zip(rows[several].tolist(), doubtful[several], strict=True))
+        rows = rows[used[rows].any(axis=1)]
+    left = np.zeros(model.weights.shape, dtype=bool)
+    left[:, wrong] = model.weights[:, wrong] & ~used.T
+    for row, cables in enumerate(chosen):
+        also = set(np.flatnonzero(others.get(row, ())).tolist()) - {cable for cable, _ in cables}
+        outliers += [Outlier(cable, int(wrong[row]), error, tuple(also)) for cable, error in cables]
+    return outliers, left
+
+
+def _copies(model: Model, state: State, samples: np.ndarray, weights: np.ndarray) -> Model:
+    """Return the model of copies of samples (k,) with weights (m, k), which begins at the state without free values."""
+    parameters, given = Parameters(model.robot, ()), model.measurements
+    lengths = given.lengths + (model.slips(state.x) / parameters.table(state.x)[:, 7:8]).T
     position, rotation = model.poses(state)
-    pose = np.concatenate([position[sample], points.angles(rotation[sample])])
-    given, copied = model.measurements, np.full(m, sample)
-    of_sample = {name: getattr(given, name) for name in ARRAYS}
-    of_sample = {name: None if of is None else of[copied] for name, of in of_sample.items()}
-    copies = changed(given, **of_sample | {"lengths": np.tile(lengths, (m, 1)), "times": None})
-    used = np.tile(model.weights[:, sample, None], (1, m))
-    felt = model.felt and model.felt.only(copied)
-    without = Model(parameters, copies, {}, used & ~np.eye(m, dtype=bool), np.tile(pose, (m, 1)), felt=felt)
-    begin = without.begin()._replace(x=state.x[: parameters.count].copy())
-    found = fit(without, begin, 1.0).state
-    of = without.residuals(found)
-    costs = of.of_samples - (of.balance**2).sum(axis=1)  # forces are far less certain in motion
-    costs[~np.isfinite(costs) | ~used[:, 0]] = np.inf
-    cable = int(np.argmin(costs))
-    residuals, derivatives = replace(without, weights=np.ones((m, m), dtype=bool)).linearised(found)
-    left[:] = costs <= costs[cable] + TOLD_APART**2
-    others = np.flatnonzero(left & (np.arange(m) != cable))
-    rest = NormalEquations.at(replace(without, weights=used & ~left[:, None]), found, metric(without))
-    if others.size and rest.inverse_root is not None:
-        by_pose = (derivatives.poses[left, cable] * without.poses_vary[cable]) @ rest.inverse_root[cable].T
-        left |= 1 / (1 + (by_pose**2).sum(axis=1).max()) < SMALLEST_REDUNDANCY
-    error = float(-model.measurements.sigma.lengths * residuals.readings[cable, cable])
-    return Outlier(cable, sample, error, tuple(others.tolist()))
+    poses = np.hstack([position[samples], points.angles(rotation[samples])])
+    of_samples = {name: getattr(given, name) for name in ARRAYS} | {"lengths": lengths, "times": None}
+    if given.poses is not None:
+        position, rotation = model.poses(model.begin()._replace(x=state.x))
+        at = np.hstack([position, points.angles(rotation)])
+        of_samples["poses"] = np.where(np.isfinite(model.pose_sigmas[:, :6]), at, np.nan)
+    copies = changed(given, **{name: None if of is None else of[samples] for name, of in of_samples.items()})
+    felt = model.felt and model.felt.only(samples)
+    return Model(parameters, copies, {}, weights, poses, felt=felt)
 
 
 def find_slips(model: Model, state: State, length: float) -> list[Slip]:
@@ -240,15 +287,10 @@ def find_slips(model: Model, state: State, length: float) -> list[Slip]:
     return slips
 
 
-def _inverse(model: Model, state: State, equations: NormalEquations | None, length: float) -> np.ndarray:
-    """Return the inverse of the normal matrix, (p, p), with the weak prior of `held`."""
-    whole = equations or NormalEquations.at(model, state, metric(model))
-    return np.linalg.inv(held(whole.S, length))
-
-
 def _absorbed(model: Model, state: State, equations: NormalEquations | None, length: float) -> np.ndarray:
     """Return the part of a step of each cable's residuals, from each sample on, that parameters absorb, (m, N)."""
-    inverse = _inverse(model, state, equations, length)
+    whole = equations or NormalEquations.at(model, state, metric(model))
+    inverse = np.linalg.inv(held(whole.S, length))
     sums, result = np.zeros((model.robot.m, len(inverse))), np.empty(model.weights.shape)
     for part in parts(model, state, equations, backwards=True):
         for i, total in enumerate(sums):

@@ -191,7 +191,7 @@ class CalibrationData(Displayed):
 
     @property
     def autocorrelation(self) -> float:
-        """Return the factor of the covariance for autocorrelated errors and undetected wrong readings, else 1."""
+        """Return the factor of the covariance for autocorrelated errors, else 1."""
         return self._noise.autocorrelation
 
     @property

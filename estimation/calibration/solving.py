@@ -16,16 +16,16 @@ from .balance import Balance
 from .carrier_clocks import CarrierClocks, has_carrier_clocks, with_carrier_clocks
 from .carrier_motion import CarrierMotion
 from .clock import CLOCK_RANGE, begin_with_clock, moves_smoothly
-from .fit import Fit, fit, held
+from .fit import Fit, fit
 from .geometry import length_of
 from .model import Model, State
-from .normal_equations import NormalEquations, metric
+from .normal_equations import metric
 from .observability import Observability
-from .outliers import LEAST_THRESHOLD, Outlier, Slip, by_left_out, find_outliers, find_slips, find_unbalanced
-from .parameters import IN_BALANCE, OF_ROBOT, Parameters
+from .outliers import LEAST_THRESHOLD, SHORTEST, Outlier, Slip, find_outliers, find_slips, find_unbalanced, robust
+from .parameters import IN_BALANCE, Parameters
 from .pose_noise import keeping, observed
 from .sightings import sighted
-from .starts import LARGEST_SHARE, fit_from, level_poses
+from .starts import fit_from, level_poses
 
 WINDING = 10.0  # standard deviations of readings that change, and so show a clock offset
 LOOSE, LOOSE_SHARE = 0.1, 0.03  # [m] of standard deviation, and share of the cables' length: files are usually better
@@ -56,7 +56,7 @@ class Noise(NamedTuple):
 
     Attributes:
         excess: Ratio of residuals to their sigmas: root of the sum of squares over the redundancy; nan without any.
-        autocorrelation: Factor of the variances because errors are autocorrelated, or wrong but unseen.
+        autocorrelation: Factor of the variances because errors are autocorrelated.
         redundancy: Number of readings minus number of unknowns, of which priors determine a part.
         covariance, information: Those of the parameters, in metres, (p, p), zero along unobservable directions.
     """
@@ -106,37 +106,25 @@ def solve(
         model, result, clocks = with_carrier_clocks(model, result, measurements, None, length)
     wrong: dict[tuple[int, int], Outlier] = {}
     slips: list[Slip] = []
-    misled = model.size_is_open
-    limit = LARGEST_SHARE * model.weights.size
     for _ in range(ROUNDS if outliers else 0):
         found, left = find_outliers(model, result.state)
         # Where more than a few readings look wrong, something lasts: they are looked at only if it is no slip.
         many = len(found) > max(2, FEW * len(measurements))
         sought = (many or not found) and len(slips) < MOST_SLIPS
         candidates = find_slips(model, result.state, length) if sought else []
+        if sought and many:  # robust fits may see readings of several cables as wrong where one has slipped
+            candidates += find_slips(model, fit(model, result.state, length).state, length)
         if candidates:
-            wrong, model = {}, replace(model, weights=np.ones_like(model.weights))
-            tried = [_with_slip(model, result, one, length) for one in candidates]
-            best = min(range(len(tried)), key=lambda i: _surprise(*tried[i][1:]))
-            slips.append(candidates[best])
-            model, result, fitted = tried[best]
-            continue
-        if not found or len(wrong) + len(found) > limit:
-            if np.array_equal(fitted, model.weights):
-                doubtful = _doubtful_slip(model, result.state, length)
-                if doubtful is not None:
-                    del slips[doubtful]
-                    model, result = _without_slip(model, result, doubtful, length)
-                    continue
-                if not misled or not wrong:
-                    break
-                misled = False
-                result, model = _again(model, result, length, False)
-                fitted = model.weights
+            every = replace(model, weights=np.ones_like(model.weights))
+            tried = [(one, *_with_slip(every, result, one, length)) for one in candidates]
+            slip, longer, other, kept = min(tried, key=lambda one: _surprise(*one[2:]))
+            large = abs(other.state.x[-1]) > LEAST_THRESHOLD * slip.sigma
+            if large and _surprise(other, kept) < _surprise(result, fitted) - SHORTEST * LEAST_THRESHOLD**2:
+                slips.append(slip)
+                wrong, model, result, fitted = {}, longer, other, kept
                 continue
-            # Readings that looked wrong in the beginning are not.
-            result, fitted = fit(model, result.state, length), model.weights
-            continue
+        if not found and np.array_equal(fitted, model.weights):
+            break
         wrong |= {(one.cable, one.sample): one for one in found}
         model = replace(model, weights=model.weights & ~left)
         result, fitted = fit(model, result.state, length), model.weights
@@ -187,39 +175,8 @@ def _with_slip(model: Model, result: Fit, slip: Slip, length: float) -> tuple[Mo
     kept = None if model.kept is None else np.pad(model.kept, ((0, 0), (0, 1)))
     model = replace(model, parameters=parameters, kept=kept)
     state = result.state._replace(x=np.append(result.state.x, slip.size))
-    near = fit(model, state, length)
-    result, used = _again(model, near, length, True) if model.size_is_open else (near, model)
-    return model, result, used.weights
-
-
-def _doubtful_slip(model: Model, state: State, length: float) -> int | None:
-    """Return the index of the least certain slip if wrong readings that are left out by now had caused it, or None."""
-    count = len(model.parameters.slips)
-    if not count:
-        return None
-    inverse = np.linalg.inv(held(NormalEquations.at(model, state, metric(model)).S, length))
-    sizes = np.abs(state.x[-count:]) / np.sqrt(np.diag(inverse)[-count:])
-    return int(np.argmin(sizes)) if sizes.min() < LEAST_THRESHOLD else None
-
-
-def _without_slip(model: Model, result: Fit, index: int, length: float) -> tuple[Model, Fit]:
-    """Return the model without one of its slips, and its fit."""
-    slips, column = list(model.parameters.slips), model.parameters.clock + OF_ROBOT + index
-    del slips[index]
-    kept = None if model.kept is None else np.delete(model.kept, column, axis=1)
-    model = replace(model, parameters=replace(model.parameters, slips=tuple(slips)), kept=kept)
-    return model, fit(model, result.state._replace(x=np.delete(result.state.x, column)), length)
-
-
-def _again(model: Model, result: Fit, length: float, outliers: bool) -> tuple[Fit, Model]:
-    """Return the better of a fit and one from the beginning with the same slips and weights, and its model.
-
-    Wrong readings may have left unknown poses in wrong local minima.
-    """
-    begin, slips = model.begin(), slice(model.parameters.clock + OF_ROBOT, None)
-    begin.x[slips] = result.state.x[slips]
-    again = fit_from(model, begin, length, outliers)
-    return min((result, model), again, key=lambda one: _surprise(one[0], one[1].weights))
+    state, weights = robust(model, fit(model, state, length).state, length)
+    return model, fit(replace(model, weights=weights), state, length), weights
 
 
 def _surprise(result: Fit, weights: np.ndarray) -> float:
@@ -355,12 +312,11 @@ def noise_of(solved: Solved) -> Noise:
         return Noise(np.nan, 1.0, redundancy, seen.covariance, seen.information)
     excess = float(np.sqrt(max(solved.fit.cost - float(((moved / sigmas) ** 2).sum()), 0.0) / redundancy))
     M, more = information_of(model, state, V * roots, np.eye(seen.rank) - D)
-    lost = by_left_out(model, state)
-    larger = (excess**2 if excess > 1 + EXCEEDS else 1.0) * lost
+    larger = excess**2 if excess > 1 + EXCEEDS else 1.0
     shares, turn = np.linalg.eigh((V / roots).T @ seen.covariance @ (V / roots))
     wide = (turn * np.sqrt(np.maximum(shares, 0.0))) @ turn.T
     spread = roots[:, None] * (wide @ (larger * M + D) @ wide) * roots
-    return Noise(excess, more * lost, redundancy, V @ spread @ V.T, V @ np.linalg.inv(spread) @ V.T)
+    return Noise(excess, more, redundancy, V @ spread @ V.T, V @ np.linalg.inv(spread) @ V.T)
 
 
 def cleaned(solved: Solved) -> tuple[Measurements, np.ndarray]:

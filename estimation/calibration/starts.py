@@ -20,7 +20,7 @@ from ..pose.problem import problem_of
 from ..pose.search import level_platform
 from .fit import Fit, fit
 from .model import Model, State
-from .outliers import find_outliers
+from .outliers import robust
 from .pose_noise import steadied
 
 SHORTEST = 1e-3  # [m]; readings without their offsets may be negative
@@ -34,7 +34,6 @@ RARE = 0.05  # share of sound poses that fit no better than those that are looke
 TURN = 1.0  # [rad] to each side about each axis, where such a search begins
 CLEARLY = 2.0  # of the squares, in variances of the noise, by which another pose must fit better
 MOST_SEARCHES = 5
-LARGEST_SHARE = 0.1  # of readings that may be left out; more are no exceptions
 
 
 def fit_from(
@@ -43,24 +42,27 @@ def fit_from(
     """Minimise the sum of squares, from level poses if none were measured; `length` is the length of the cables [m].
 
     It returns the fit, and the model with its weights of readings and the directions that it keeps. With `outliers`,
-    readings that look wrong in the first fit are excluded, because parameters and poses that adapt to them would hide
+    readings that do not fit those of most are excluded, because parameters and poses that adapt to them would hide
     them. `enough` is that of `fit`.
 
     The state has initial parameters, and the poses of `model.begin()`.
     """
+
+    def cleaned(of: Model, state: State, softest: float = np.inf) -> tuple[State, np.ndarray]:
+        return robust(of, state, length, softest) if outliers else (state, of.weights)
+
     if not np.isinf(model.pose_sigmas).any():
-        return fit(model, state, length, enough=enough), model
+        result = fit(model, state, length, enough=enough)
+        state, weights = cleaned(model, result.state)
+        return result._replace(state=state), replace(model, weights=weights)
     state = _by_forces(model, state, length)
     rough, begin = _rough(model, state, length)
-    state = fit(rough, begin, length, enough=ENOUGH).state
-    for _ in range(MOST_SEARCHES if outliers else 0):
-        found, left = find_outliers(rough, state)
-        if not found or (left | ~rough.weights).sum() > LARGEST_SHARE * left.size:
-            break
-        rough = replace(rough, weights=rough.weights & ~left)
-        state = fit(rough, state, length, enough=ENOUGH).state
-    clean = replace(model, weights=rough.weights)
+    state, weights = cleaned(rough, fit(rough, begin, length, enough=ENOUGH).state)
+    clean = replace(model, weights=weights)
     clean, state = steadied(clean, _elsewhere(clean, state) or state, length)
+    softest = (rough.measurements.sigma.lengths / model.measurements.sigma.lengths) ** 2
+    state, weights = cleaned(replace(clean, weights=model.weights), state, softest)
+    clean = replace(clean, weights=weights)
     result = fit(clean, state, length, enough=enough)
     for _ in range(MOST_SEARCHES):
         other = _elsewhere(clean, result.state)
