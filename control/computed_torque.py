@@ -78,7 +78,7 @@ class ComputedTorque(Controller):
             (core/control/thrusts.c). Default of `attitude`: 40, or less if the known lags of rotors and sensors require
             it (control/bandwidths.py); of `place`: 5, but at most a sixth of `attitude`. If carriers turn with so
             much lag that the attitude loop would be unstable (core/control/turning.c), `attitude` is lowered to the
-            inverse of the lag.
+            inverse of the lag, `place` and `carrier_bandwidth` by the same factor.
         patience: Time for which the sensor of a cable may report no tension, although one is commanded, until the cable
             is treated as cut [s] and the others replace it. The cable then gets its smallest tension, and is used again
             once its sensor reports a tension. Cables of fixed length are never treated as cut. If no sensor reports a

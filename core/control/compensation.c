@@ -103,8 +103,7 @@ static void wrench_of_offsets(const towline_robot *robot, const towline_controll
 }
 
 /* Let an offset go towards where it is wanted, by a lag of second order, for `dt` [s]; return its acceleration. */
-static double follow(const towline_controller *controller, double dt, double wanted, double *offset, double *rate) {
-    const double bandwidth = controller->carrier_bandwidth, most = controller->carrier_acceleration;
+static double follow(double bandwidth, double most, double dt, double wanted, double *offset, double *rate) {
     if (!(dt > 0)) { return 0; }
     const double bend = fmin(fmax(bandwidth * (bandwidth * (wanted - *offset) - 2 * *rate), -most), most);
     *rate += dt * bend;
@@ -125,6 +124,8 @@ static void add_offset(double turn, const double *offset, double *coordinates) {
 void towline_compensate(const towline_robot *robot, const towline_controller *controller, double dt,
                         const configuration *at, const double *A, const double *missing, towline_row *row) {
     const double scale = 1 / robot->length_scale, share = controller->corrects ? ALONG : SHARE;
+    /* Carriers that turn late also move late. */
+    const double bandwidth = controller->carrier_bandwidth * row->platform->attitude / controller->attitude;
     double columns[6 * CARRIERS][6], x[6], given[6], kept[6] = {0, 0, 0, 0, 0, 0};
     towline_carrier_columns(robot, controller, at, row->t_ref, scale, columns);
     least_effort(robot, share * robot->force_scale, DAMPED, A, missing, scale, columns, x);
@@ -140,7 +141,8 @@ void towline_compensate(const towline_robot *robot, const towline_controller *co
             double wanted = 0;
             for (int j = 0; j < 6; j++) { wanted += columns[6 * c + k][j] * (x[j] + kept[j]) * reach; }
             wanted = fmin(fmax(wanted, -reach), reach);
-            bends[k] = follow(controller, dt, wanted, &memory->offset[k], &memory->offset_rate[k]);
+            bends[k] = follow(bandwidth, controller->carrier_acceleration, dt, wanted, &memory->offset[k],
+                              &memory->offset_rate[k]);
         }
         add_offset(carrier[5], bends, carrier + 12);
     }

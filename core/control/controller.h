@@ -68,7 +68,7 @@ typedef struct {
     double offset[6], offset_rate[6]; /* off its reference, to help the tensions; small rotations in level axes */
     double force[3];                  /* estimated: what acts beside thrust, cables and weight, in {G} [N] */
     double explained[3];              /* momentum less what the estimate explains */
-    double ordered[3];                /* angular acceleration, in its own axes; nan where an actuator is at its limit */
+    double ordered[3];                /* angular acceleration within the actuators' limits, in its own axes */
     double turning[3];                /* rate that is measured, in its own axes */
     double lacking;                   /* thrust that its actuators do not give, or give too much, by their limits [N] */
     double wanted[TOWLINE_MOST_ACTUATORS]; /* commands before limits, without noise */

@@ -86,7 +86,7 @@ static void observe_carrier(const flier *it, double dt, const towline_cable_memo
 
 /* Write the thrust F that a carrier needs, in {G}, and the moment of its cables. */
 static void needed_force(const flier *it, const double *tensions, double *force, double *moment) {
-    const double mass = it->body->mass[0], place = it->controller->place;
+    const double mass = it->body->mass[0], place = it->controller->place * it->attitude / it->controller->attitude;
     const double *order = it->order, *motion = it->motion;
     for (int k = 0; k < 3; k++) {
         const double away = order[k] - motion[k], slower = order[6 + k] - motion[6 + k];
@@ -219,8 +219,8 @@ static double wrench_of_carrier(const flier *it, double dt, const double *tensio
 /* Write commands inside their limits, where they are numbers, and remember what they lack of F, `across` or along. */
 static void command(const flier *it, double dt, const double *wrench, double across, double *actuation) {
     const double share = 1 - exp(-SLOWER * it->attitude * dt);
-    int followed = 1, limited = 0;
-    double thrust = 0;
+    int limited = 0;
+    double thrust = 0, moment[3] = {0, 0, 0}, faster[3]; /* what limits add */
     for (int a = 0; a < it->body->actuators; a++) {
         const towline_actuator *limits = &it->body->actuator[a];
         double wanted = 0;
@@ -232,13 +232,14 @@ static void command(const flier *it, double dt, const double *wrench, double acr
             *smooth = dt > 0 ? *smooth + share * (wanted - *smooth) : wanted;
             limited |= *smooth < limits->low || *smooth > limits->high;
         }
-        followed &= wanted == actuation[a];
+        for (int k = 0; k < 3; k++) { moment[k] += (actuation[a] - wanted) * limits->wrench[3 + k]; }
         thrust += actuation[a] * limits->wrench[2];
     }
     it->memory->limited += fmin(dt / WINDOW, 1) * (limited - it->memory->limited);
     const double missing = fmax(fabs(wrench[2] - thrust), it->memory->limited > MOSTLY ? across : 0);
     it->memory->lacking = fmax(it->memory->lacking, missing);
-    for (int k = 0; k < 3 && !followed; k++) { it->memory->ordered[k] = NAN; }
+    constant_times(it->body->inverse_inertia, moment, faster);
+    for (int k = 0; k < 3; k++) { it->memory->ordered[k] += faster[k]; }
 }
 
 double towline_write_thrusts(const towline_robot *robot, const towline_controller *controller, double dt,
