@@ -20,6 +20,7 @@ from ...base.quiet import quiet
 STEEPNESS = 1e-2  # of the largest row along u; toppra drops 1e-8 of x at each step, which must be little beside x
 UNLIMITED = 1e7  # x in toppra's units that no limit has stopped; its own bounds are at 1e8
 ROUNDING = 1e-12  # of a row along u: less is zero
+TOGETHER = 16  # half-planes in a constraint of toppra, which multiplies them by a matrix of twice as many rows and columns
 FARTHEST = 1e9  # u and x in toppra's units; a limit beyond does not count
 
 
@@ -30,6 +31,10 @@ class Rows(NamedTuple):
     b: np.ndarray
     c: np.ndarray
     x_max: np.ndarray
+
+    def of(self, columns: slice) -> "Rows":
+        """Return some of the limits, and the same largest x."""
+        return Rows(self.a[:, columns], self.b[:, columns], self.c[:, columns], self.x_max)
 
 
 class Law(NamedTuple):
@@ -87,7 +92,8 @@ def fastest(s: np.ndarray, rows: Rows) -> Law:
         return Law(None, int(np.argmax(never)))
     grid = s * unit
     with quiet("toppra"):  # which warns of laws that do not exist: a normal result here
-        algorithm = TOPPRA([_HalfPlanes(scaled)], _Interval(float(grid[-1])), gridpoints=grid, solver_wrapper="seidel")
+        parts = [_HalfPlanes(scaled.of(slice(k, k + TOGETHER))) for k in range(0, scaled.a.shape[1], TOGETHER)]
+        algorithm = TOPPRA(parts, _Interval(float(grid[-1])), gridpoints=grid, solver_wrapper="seidel")
         result: Any = algorithm.compute_parameterization(0.0, 0.0, return_data=True)  # hints: three or four values
     _, speeds, _, reach = result
     if speeds is None:
