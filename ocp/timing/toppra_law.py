@@ -20,7 +20,7 @@ from ...base.quiet import quiet
 STEEPNESS = 1e-2  # of the largest row along u; toppra drops 1e-8 of x at each step, which must be little beside x
 UNLIMITED = 1e7  # x in toppra's units that no limit has stopped; its own bounds are at 1e8
 ROUNDING = 1e-12  # of a row along u: less is zero
-TOGETHER = 16  # half-planes in a constraint of toppra, which multiplies them by a matrix of twice as many rows and columns
+TOGETHER = 16  # half-planes that toppra takes together: it multiplies them by a dense matrix of twice their number
 FARTHEST = 1e9  # u and x in toppra's units; a limit beyond does not count
 
 
