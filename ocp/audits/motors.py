@@ -6,6 +6,8 @@ from ...solvers import solve_batch
 from ..limits.cables import WinchForce, WinchPower
 from ..tasks.scenario import Scenario
 
+SPARES = 0.0, 1e-6, 1e-4, 1e-2  # of the weight: by how much motors are exceeded where that is necessary, in order
+
 
 def within_motors(
     scenario: Scenario, times: np.ndarray, A: np.ndarray, case: tuple[np.ndarray, np.ndarray], values: list[np.ndarray]
@@ -13,8 +15,8 @@ def within_motors(
     """Return the tensions (n, m) [N] of a motion, within the force and power of motors wherever such exist.
 
     At each instant of a motion a motor's limit is one of the tension: its force is the tension and what accelerates the
-    winch, its power the tension times a speed. Where none exist, and at all other instants, the tensions are the given
-    ones.
+    winch, its power the tension times a speed. Where none exist, they exceed what motors can by little, if such exist;
+    at all other instants the tensions are the given ones.
 
     - `A`: Wrench matrices with moments over `Robot.length`, (n, 6, m).
     - `case`: Wrenches with the same moments, (n, 6) [N], and their tensions so far, (n, m) [N].
@@ -22,18 +24,25 @@ def within_motors(
     """
     w, tensions = case
     low, high = scenario.bounds_at(times)
+    least, most = np.full_like(low, -np.inf), np.full_like(high, np.inf)  # that motors permit
     for limit, its in zip(scenario.limits, values, strict=True):
         if isinstance(limit, WinchForce):
             reflected = its - tensions[:, limit.cables]
-            high[:, limit.cables] = np.minimum(high[:, limit.cables], limit.high - reflected)
-            low[:, limit.cables] = np.maximum(low[:, limit.cables], -limit.high - reflected)
+            most[:, limit.cables] = limit.high - reflected
+            least[:, limit.cables] = -limit.high - reflected
         elif isinstance(limit, WinchPower):
             slower = limit.high / np.maximum(np.abs(its), limit.high)
-            high = np.where(slower < 1, np.minimum(high, slower * tensions), high)
-    rows = np.flatnonzero(((tensions > high) | (tensions < low)).any(axis=1) & (low <= high).all(axis=1))
-    if not rows.size:
+            most = np.where(slower < 1, np.minimum(most, slower * tensions), most)
+    exceeded = ((tensions > np.minimum(high, most)) | (tensions < np.maximum(low, least))).any(axis=1)
+    if not exceeded.any():
         return tensions
-    found = solve_batch(A[rows], w[rows], low[rows], high[rows], tensions[rows])
     chosen = tensions.copy()
-    chosen[rows[found.feasible]] = found.tensions[found.feasible]
+    for spare in SPARES:
+        by = spare * scenario.robot.force_scale
+        lowest, highest = np.maximum(low, least - by), np.minimum(high, most + by)
+        rows = np.flatnonzero(exceeded & (lowest <= highest).all(axis=1))
+        if rows.size:
+            found = solve_batch(A[rows], w[rows], lowest[rows], highest[rows], tensions[rows])
+            chosen[rows[found.feasible]] = found.tensions[found.feasible]
+            exceeded[rows[found.feasible]] = False
     return chosen

@@ -14,6 +14,7 @@ from ...models.part import PositiveRange
 from ..audits.audit import audit
 from ..plan import Plan
 from ..proofs.durations import Durations, durations
+from ..proofs.infeasible_ends import infeasible_ends
 from ..result import PlannerStep
 from ..tasks.lay_out import lay_out
 from ..tasks.lay_out_phases import LEAST_INSTANTS
@@ -55,8 +56,14 @@ def shortest_durations(scenario: Scenario) -> tuple[Scenario, Chosen | None]:
 
 
 def _with_dwell(scenario: Scenario, span: PositiveRange) -> tuple[Scenario, Chosen]:
-    """Return the scenario with the fastest time law, or else with the path's own law in the least time."""
+    """Return the scenario with the fastest time law, or else with the path's own law in the least time.
+
+    If ends or path are proven infeasible, that is the longest.
+    """
     start, task = time.perf_counter(), scenario.task
+    if (proof := infeasible_ends(scenario.lasting(span.max))) is not None:
+        stage = PlannerStep("duration with its dwells", proof.describe(), time.perf_counter() - start)
+        return scenario.held(span.max), Chosen(stage)
     law, message = fastest(scenario)
     chosen = None
     if law is not None and law.law is not None and law.feasible and span.min <= law.duration <= span.max:

@@ -55,7 +55,7 @@ RISE = 2.5  # times 1 / intervals: change of the logarithm of a zone's bound fro
 NEAR_REST = 0.5 ** np.arange(7.0, 0.0, -1.0)  # of the interval beside a rest, where further points are
 CLOSEST = 1e-3  # of a step of a grid: points that are nearer to each other are one
 COARSE_EXCESS = 1e-4  # of a limit: if it is exceeded by more it takes a finer grid, if by less some distance everywhere
-MOST_SHORT = 24  # sets of motors; each adds as many half-planes as the cables have
+MOST_CUTS = 24  # times that half-planes of motors are added
 PIECES = (400, 800, 1600)  # of a spline through points of a path, until it is near enough
 LOOKS = 20_001
 ON_PATH = 2e-6  # of a path's length: how far that spline may be off
@@ -251,26 +251,23 @@ def _piece(
     """Solve one piece.
 
     A motor limits a tension by less than the cable does only while it accelerates its winch. Which motors do that is
-    not known beforehand: half-planes for those of a law without them are added until a law has no others.
+    not known beforehand: those half-planes of theirs that a law exceeds somewhere are added until it exceeds none.
     """
     fastest, Rows = _toppra()
     inside = s if s[-1] == 1 else np.append(s[:-1], np.nextafter(s[-1], 0.0))
     plane, weight = phase_plane(parametrised, limits, inside, margin, reserve, shrink), parametrised.robot.force_scale
     rows = plane.rows(weight)
     law = fastest(s - s[0], Rows(*rows, plane.x_max))
-    known = list[np.ndarray]()
-    while law.x is not None and plane.winches is not None and not law.unlimited:
-        u = np.diff(law.x) / (2 * np.diff(s))
-        new = []
-        for each in (np.append(u, u[-1]), np.append(u[0], u)):  # those after and before each point
-            short = plane.winches.short(each, law.x)
-            which = np.hstack(short)
-            if not (~which.any(axis=1) | np.any([(which == other).all(axis=1) for other in known], axis=0)).all():
-                new.append(plane.winch_rows(short, weight))
-                known.append(which)
-        if not new or len(known) > MOST_SHORT:
+    for _ in range(MOST_CUTS if plane.winches is not None else 0):
+        if law.x is None or law.unlimited:
             break
-        rows = tuple(np.hstack(parts) for parts in zip(rows, *new, strict=True))
+        known, u, x = rows[0].shape[1], np.diff(law.x) / (2 * np.diff(s)), law.x[:, None]
+        for each in (np.append(u, u[-1]), np.append(u[0], u)):  # those after and before each point
+            a, b, c = plane.winch_rows(plane.winches.short(each, law.x), weight)
+            beyond = (a * each[:, None] + b * x + c > RESERVE).any(axis=0)
+            rows = tuple(np.hstack([part, its[:, beyond]]) for part, its in zip(rows, (a, b, c), strict=True))
+        if rows[0].shape[1] == known:
+            break
         law = fastest(s - s[0], Rows(*rows, plane.x_max))
     return _Piece(s, inside, plane, law)
 
