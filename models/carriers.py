@@ -225,8 +225,9 @@ class MobileCarrier(Carrier):
         return self
 
     def free_coordinates(self, drive: Drive) -> tuple[int, ...]:
-        """Return its position, unless winches alone move the platform."""
-        return () if drive == "variable-length" else POSITION
+        """Return the axes along which the reach box is not flat; none if winches alone move the platform."""
+        low, high = self.reach.min, self.reach.max
+        return () if drive == "variable-length" else tuple(axis for axis in POSITION if low[axis] < high[axis])
 
     @property
     def motion_limits(self) -> MotionLimits:

@@ -154,17 +154,18 @@ def _implausible(robot: Robot) -> list[str]:
             f"platform.dof: {fixed} cannot move, so something else is assumed to carry the weight, although the cables "
             f"are inclined; if the platform hangs from them, add {fixed}"
         )
+    of_cables: dict[str, list[str]] = {}  # the cables of which a sentence is true
+    for index, cable in enumerate(robot.cables):
+        most = np.inf if cable.winch is None or robot.fixed_lengths is not None else cable.winch.tension_max
+        said = [f"t_min equals t_max, {quantity(cable.t_max, 'N')}"] * (cable.t_min == cable.t_max)
+        for name, tension in (("t_min", cable.t_min), ("t_max", cable.t_max)):
+            with_less = f"but only with force_max less friction, {quantity(most, 'N')}"
+            said += [f"the winch cannot haul in with {name}, {quantity(tension, 'N')}, {with_less}"] * (most < tension)
+        for sentence in said:
+            of_cables.setdefault(sentence, []).append(f"cables[{index}]")
     warnings.extend(
-        f"cables[{index}]: t_min equals t_max, {quantity(cable.t_max, 'N')}"
-        for index, cable in enumerate(robot.cables)
-        if cable.t_min == cable.t_max
-    )
-    warnings.extend(
-        f"cables[{index}]: its winch cannot haul in with {name}, {quantity(tension, 'N')}, but only with force_max "
-        f"less friction, {quantity(cable.winch.tension_max, 'N')}"
-        for index, cable in enumerate(robot.cables if robot.fixed_lengths is None else ())
-        for name, tension in (("t_min", cable.t_min), ("t_max", cable.t_max))
-        if cable.winch and cable.winch.tension_max < tension
+        f"{'every cable' if len(cables) == robot.m > 1 else ', '.join(cables)}: {sentence}"
+        for sentence, cables in of_cables.items()
     )
     return warnings
 

@@ -31,7 +31,7 @@ from ..models.trajectory import Motion, Trajectory
 from ..solvers import Certificate, TensionProblem, certify, solve_batch
 from ..solvers.available_wrench import facets
 from ..solvers.in_place import RHO
-from .continuation import continued
+from .continuation import RESTS, continued
 from .distribution import wrench_problem
 from .team_stops import TeamStop, team_stop_along
 from .winch_forces import has_winches, overloaded_winch, shares_of_winches
@@ -145,9 +145,11 @@ def _stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Stop:
     trajectory = continued(trajectory, together=False)
     best: tuple[tuple[int, bool, float], Stop, TensionProblem | None] | None = None
     instants = cache(lambda first: _instants(robot, trajectory, first))  # which all attempts have in common
-    for reserve, goes_on in ATTEMPTS:
-        law = _refined(_braking(_Limits(instants, begins, end, reserve, goes_on)))
-        found, missing, worst = _audited(robot, trajectory, law)
+    for attempt in (*ATTEMPTS, None):
+        law = _braking(_Limits(instants, begins, end, *attempt)) if attempt else _planned(trajectory, begins, end)
+        if law is None:
+            break
+        found, missing, worst = _audited(robot, trajectory, _refined(law))
         if missing <= MISSING * robot.force_scale and not found.limit:
             return found
         # Of two that miss little, or nearly the same, the shorter one.
@@ -159,10 +161,9 @@ def _stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Stop:
 
 
 def _of_team(robot: Robot, found: TeamStop) -> Stop:
-    times, tau, platform, carriers, tensions, _, limit = found
-    distance = float(np.linalg.norm(np.diff(platform[0][:, :3], axis=0), axis=1).sum())
-    motions = times, platform, carriers, tensions
-    return Stop(robot, float(tau[0]), float(tau[-1]), *motions, distance, certificate=None, limit=limit)
+    times, tau, *motions, _, limit = found
+    distance = float(np.linalg.norm(np.diff(found.platform[0][:, :3], axis=0), axis=1).sum())
+    return Stop(robot, float(tau[0]), float(tau[-1]), times, *motions, distance, certificate=None, limit=limit)
 
 
 def beginnings(trajectory: Trajectory, period: float) -> np.ndarray:
@@ -233,7 +234,8 @@ class _Limits:
         while place > len(self._lowest) - 3:
             self._extend(1)
         k = int(place)
-        least, most = _Bounds(*(part[k : k + 2] for part in self._rows)).range_of(np.full(2, rate * rate))
+        # Three instants, so that where the plan's acceleration jumps, u keeps the limits after it a step before it.
+        least, most = _Bounds(*(part[k : k + 3] for part in self._rows)).range_of(np.full(3, rate * rate))
         low, high = float(least.max()), float(most.min())
         if low > high:  # none is possible: of those between, the one nearest to the rate of now
             u = min(max(0.0, high), low)
@@ -299,13 +301,13 @@ def _instants(robot: Robot, trajectory: Trajectory, first: float) -> _Instants:
     platform, carriers = trajectory.at(first + WINDOW / INSTANTS * np.arange(INSTANTS))
     dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
     scale, still = robot.wrench_scale[rows], np.zeros_like(platform[0])
-    whole = dynamics.wrench_matrix(platform[0], carriers[0])
     c, a, b = (
         dynamics.required_wrench(platform[0], *motion, wind=trajectory.wind)
         for motion in ((still, still), (still, platform[1]), platform[1:])
     )
     a, b = a - c, b - c
-    available = facets(whole[:, rows] * scale[:, None], robot.t_min, robot.t_max)
+    A = dynamics.wrench_matrix(platform[0], carriers[0])[:, rows]
+    available = facets(A * scale[:, None], robot.t_min, robot.t_max)
     a, b, c = (np.einsum("nki,ni->nk", available.normals, part[:, rows] * scale) for part in (a, b, c))
     a[np.abs(a) < FLAT * robot.force_scale] = np.nan
     limited = [k for k, carrier in enumerate(robot.carriers) if carrier.motion_limits.acceleration is not None]
@@ -337,6 +339,20 @@ def _braking(limits: _Limits) -> _Law:
     return _Law(*np.array(rows).T)
 
 
+def _planned(trajectory: Trajectory, begins: float, end: float) -> _Law | None:
+    """Return the plan's own law until it rests, which brakes hardest if it is the fastest; None if it moves on."""
+    early, late = begins, min(begins + WINDOW, end)
+    for _ in range(3):  # at a corner the platform rests for an instant
+        tau = np.linspace(early, late, 1000)
+        speed = np.max([np.abs(motion[1]).reshape(len(tau), -1).max(axis=1) for motion in trajectory.at(tau)], axis=0)
+        rests, near = float(tau[speed.argmin()]), tau[1] - tau[0]
+        early, late = max(rests - near, begins), min(rests + near, end)
+    if speed.min() > RESTS or rests - begins < STEP:
+        return None
+    tau = np.linspace(begins, rests, int((rests - begins) / STEP) + 2)
+    return _Law(tau - begins, tau, np.ones_like(tau), np.zeros_like(tau))
+
+
 def _refined(law: _Law) -> _Law:
     """Return a law with more instants in each step, in which u is linear."""
     t, tau, rate, u = (part[:-1, None] for part in law)
@@ -354,7 +370,7 @@ def _refined(law: _Law) -> _Law:
 def _slowed(motion: Motion, law: _Law) -> Motion:
     """Return pose, velocity and acceleration of a motion that follows a law."""
     pose, velocity, acceleration = motion
-    rate, slope = (part.reshape(-1, *[1] * (pose.ndim - 1)) for part in (law.rate, law.slope))
+    rate, slope = (part.reshape(-1, *[1] * (pose.ndim - 1)) for part in law[2:])
     return pose, rate * velocity, rate**2 * acceleration + slope * velocity
 
 

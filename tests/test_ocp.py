@@ -333,6 +333,31 @@ def test_rest_is_rest_also_beside_a_moving_reference():
     np.testing.assert_allclose(found.trajectory["carrier_velocity"].values[[0, -1]], 0, atol=1e-6)
 
 
+def test_robots_on_the_ground_have_flat_reach_boxes():
+    """Three vehicles tow a raft, and none leaves the plane: neither their heights nor the program's rows move."""
+    box = {"min": [-9, -9, 0], "max": [9, 9, 0]}
+    places = {"front": (5, 0), "left": (-3, 4), "right": (-3, -4)}
+    vehicle = {"kind": "mobile", "reach": box, "speed_max": 2, "acceleration_max": 1}
+    raft = {"mass": 50, "inertia": [9, 9, 9, 0, 0, 0], "dof": ["x", "y", "yaw"], "home": [0] * 6}
+    cable = {"anchor": [0, 0, 0], "t_min": 1, "t_max": 300}
+    ends = {"front": [1, 0.1, 0], "left": [-1, -0.2, 0], "right": [-1, 0.2, 0]}
+    file = {
+        "name": "raft",
+        "source": "a test",
+        "gravity": [0, 0, 0],
+        "platform": raft,
+        "carriers": [vehicle | {"name": name, "home": [x, y, 0, 0, 0, 0]} for name, (x, y) in places.items()],
+        "cables": [cable | {"carrier": name, "attachment": end} for name, end in ends.items()],
+        "drive": "both",
+    }
+    robot = Robot.model_validate(file)
+    assert all(carrier.free_coordinates("both") == (0, 1) for carrier in robot.carriers)
+    line = {"kind": "line", "start": [0, 0, 0], "end": [3, 0, 0]}
+    found = plan(robot, {"path": line, "duration": 10, "steps": 20, "base": {"kind": "free"}})
+    assert found.feasible, found.report()
+    np.testing.assert_allclose(found.trajectory["carrier_pose"].values[..., 2:], 0.0, atol=1e-12)
+
+
 def test_carriers_limits_count_whatever_the_base_does():
     """Held or given far outside their reach boxes, or too fast: no such plan is feasible."""
     robot = load("wang-ctmrts")

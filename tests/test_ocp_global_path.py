@@ -255,3 +255,15 @@ def test_formations_keep_the_balance_of_a_load():
     unclipped = np.linalg.norm(cables[..., :2], axis=2).max(axis=1) < 0.96 * LENGTH
     assert unclipped.sum() > 50
     np.testing.assert_allclose((weights @ cables[unclipped])[:, :2], 0, atol=1e-12)
+
+
+def test_places_on_the_axis_of_a_swivelling_pulley_are_not_tried():
+    # There the pulley has no direction, and a point mass is often sampled there: at the edge of the anchors' box.
+    pulley = {"pulley": {"radius": 0.05, "axis": [0, 0, 1]}}
+    robot = type(ROBOT).model_validate(
+        ROBOT.model_dump() | {"cables": [cable.model_dump() | pulley for cable in ROBOT.cables]}
+    )
+    rest = AtRest(scenario_of(WALL_WITH_A_HOLE, robot), 1.0)
+    poses = np.array([[-0.4, 0, 1, 0, 0, 0], [*robot.home_anchors[0] - [0, 0, 1], 0, 0, 0]])
+    kept = rest(poses, np.zeros((2, len(robot.carriers), 6)))
+    assert kept.slack[0] > 0 > kept.slack[1]

@@ -102,6 +102,8 @@ class AtRest:
         """
         scenario, robot = self.scenario, self.scenario.robot
         A = scaled(scenario, scenario.dynamics.wrench_matrix(platform, carriers))
+        known = np.isfinite(A).all(axis=(1, 2))  # false where an attachment lies on the axis of a pulley or inside it
+        A[~known] = 0.0
         if self._weight is not None:
             w = np.broadcast_to(self._weight, platform.shape)
         else:
@@ -110,7 +112,7 @@ class AtRest:
         few, inverse = few_and_inverse(A, len(robot.platform.dof))
         tensions = np.clip((inverse @ w[..., None])[..., 0], *self._bounds)
         missed = np.linalg.norm((A @ tensions[..., None])[..., 0] - w, axis=1)
-        return A, w, tensions, missed <= (MISSED if few else BALANCED) * robot.force_scale, not few
+        return A, w, tensions, known & (missed <= (MISSED if few else BALANCED) * robot.force_scale), not few
 
     def _slack(
         self, platform: np.ndarray, carriers: np.ndarray, tensions: np.ndarray, off_path: np.ndarray | None

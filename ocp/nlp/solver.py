@@ -180,7 +180,7 @@ class Solver:
             raise
         statistics = nlp.stats()
         last = {name: result[name].full().ravel() for name in KEPT}
-        x, iterations = last["x"], int(statistics["iter_count"])
+        x, iterations = last["x"], max(watch.iteration - 1, 0)  # the first call of the watch is before any
         objective = float(result["f"])
         message = statistics["return_status"]
         # With more equations than unknowns IPOPT does not start, and returns zeros.

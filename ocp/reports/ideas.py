@@ -7,6 +7,7 @@ import numpy as np
 
 from ...base.display import Fact
 from ...base.text import quantity, quantity_row
+from ...models.carriers import TILT
 from ..audits.excess import TENSIONS
 from ..proofs.too_heavy import OF_WEIGHT
 from ..result import PlanData
@@ -62,8 +63,9 @@ def _carriers(plan: PlanData) -> list[Fact]:
     if task.base.kind == "hold" and any(carrier.free_coordinates(robot.drive) for carrier in robot.carriers):
         return [("moving carriers", "`base: {kind: free}`: the planner then chooses how the carriers move")]
     if task.base.kind == "free" and not task.tube.turn and robot.dof_mask[ATTITUDE].any():
-        tilts = "the platform may then tilt by 0.2 rad as it accelerates"
-        return [("a tilting platform", f"`tube: {{attitude: 0.2}}`: {tilts}")]
+        turn = "tilt" if robot.dof_mask[list(TILT)].any() else "turn"
+        then = f"the platform may then {turn} by 0.2 rad as it accelerates"
+        return [(f"a {turn}ing platform", f"`tube: {{attitude: 0.2}}`: {then}")]
     return []
 
 

@@ -33,10 +33,10 @@ def outside_frame(seen: Instants) -> list[str]:
 
     The frame is the box of the anchors during the motion; below, the plane z = 0 of {G} is the floor if gravity
     points down and no anchor is lower. A side beyond which the platform is at home, or for a robot without `home` at
-    the start of the motion, does not count: a robot whose {G} lies in the ceiling has no floor, and a robot that lifts
-    its platform over its anchors has no top. Anchors in one vertical plane have no sides across it, since a platform
-    may swing there. A robot whose carriers can fly or drive anywhere has no frame. Where the robot's file has a
-    floor or a room, limits keep the platform there.
+    the start of the motion, does not count: a robot whose {G} lies in the ceiling has no floor, a robot that lifts its
+    platform over its anchors no top, and cranes that carry a long beam have no sides along it. Anchors in one vertical
+    plane have no sides across it, since a platform may swing there. A robot whose carriers can fly or drive anywhere
+    has no frame. Where the robot's file has a floor or a room, limits keep the platform there.
     """
     size = float(np.linalg.norm(np.ptp(seen.anchors, axis=(0, 1))))
     sentences = []
@@ -76,10 +76,11 @@ def _sides(seen: Instants) -> list[Side]:
             elif axis == 2:
                 words = f"{'below the lowest' if sign < 0 else 'above the highest'} anchor (z = {quantity(bound)} m)"
             sides.append(Side(axis, sign, float(bound), words))
-    usual = seen.platform[0]
+    usual, held = seen.platform[0], seen.anchors[0]
     if robot.platform.home is not None:
-        usual = np.vstack([robot.home_com, robot.home_attachments])
-    return [side for side in sides if side.beyond(usual).max() <= LEAST * 1e-3]
+        usual, held = np.vstack([robot.home_com, robot.home_attachments]), robot.home_anchors
+    ways = [side.beyond(usual) - (min(side.beyond(held).max(), 0.0) if side.axis < 2 else 0.0) for side in sides]
+    return [side for side, beyond in zip(sides, ways, strict=True) if beyond.max() <= LEAST * 1e-3]
 
 
 def leaves_its_points(path: PathBase) -> list[str]:
