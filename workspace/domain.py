@@ -116,7 +116,7 @@ class Domain(Displayed):
         """Return position, and attitude and carriers' positions if they vary, for each configuration, (n, k)."""
         parts = [places.pose if self.attitude_varies else places.pose[:, :3]]
         if self.carriers_vary:
-            parts.append(places.carriers[:, :, :3].reshape(len(places), -1))
+            parts.append(places.carriers[:, :, :3].reshape(len(places), 3 * places.carriers.shape[1]))
         return np.hstack(parts) if len(parts) > 1 else parts[0]
 
     def places(self, units: np.ndarray) -> tuple[Places, np.ndarray]:
