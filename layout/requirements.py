@@ -184,7 +184,9 @@ class Requirements(Part):
         (),
     )
     margin: Positive = optional(
-        "smallest accepted capacity margin, with moments divided by the `length` of the robot's file [N]", 1.0
+        "smallest accepted capacity margin, with moments divided by the `length` of the robot's file; default: 1 N, "
+        "or 10 % of the robot's weight if that is less [N]",
+        1.0,
     )
     clearance: NonNegative = optional("smallest distance between two cables [m]; 0: no limit", 0.0)
     keep_out: Annotated[tuple[AnyKeepOut, ...], Field(max_length=20)] = optional(

@@ -25,6 +25,8 @@ from .room import room_of
 from .search import ROOM_AUDITED, Found, Progress, audited_rows, few, search
 from .variables import Variables, variables_of
 
+USUAL_SHARE = 0.1  # of the robot's weight: the margin if that is less than the usual one
+
 
 def design(
     robot: AnyRobot,
@@ -77,6 +79,8 @@ def design(
     if chosen.m < (count := int(chosen.dof_mask.sum())):
         wanted_cables = f"at least {count} cables for its {count} coordinates"
         raise InputError(f"robot {chosen.name!r} must have {wanted_cables}, got {chosen.m}")
+    if "margin" not in wanted.model_fields_set:  # 1 N is more than the cables of a light robot can give
+        wanted = wanted.model_copy(update={"margin": min(wanted.margin, USUAL_SHARE * chosen.force_scale)})
     variables, _ = variables_of(chosen, wanted), room_of(chosen, wanted)
     grid = rows_of(chosen, wanted.require, [each.places() for each in wanted.require])
     # Of other pairings the boxes of the robot's own points prove nothing.

@@ -161,9 +161,10 @@ def _stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Stop:
 
 
 def _of_team(robot: Robot, found: TeamStop) -> Stop:
-    times, tau, *motions, _, limit = found
-    distance = float(np.linalg.norm(np.diff(found.platform[0][:, :3], axis=0), axis=1).sum())
-    return Stop(robot, float(tau[0]), float(tau[-1]), times, *motions, distance, certificate=None, limit=limit)
+    times, tau, platform, carriers, tensions, _, limit = found
+    distance = float(np.linalg.norm(np.diff(platform[0][:, :3], axis=0), axis=1).sum())
+    ends = float(tau[0]), float(tau[-1])
+    return Stop(robot, *ends, times, platform, carriers, tensions, distance, certificate=None, limit=limit)
 
 
 def beginnings(trajectory: Trajectory, period: float) -> np.ndarray:
@@ -378,9 +379,8 @@ def _audited(robot: Robot, trajectory: Trajectory, law: _Law) -> tuple[Stop, flo
     """Return a stop, how much of the wrench its tensions miss most [N], and the problem of that instant."""
     platform, carriers = trajectory.at(law.tau)
     slowed, dynamics, mask = _slowed(platform, law), dynamics_of(robot), robot.dof_mask
-    A = dynamics.wrench_matrix(platform[0], carriers[0])
-    w = dynamics.required_wrench(*slowed, wind=trajectory.wind)
-    A, w = A * mask[:, None], w * mask
+    A = dynamics.wrench_matrix(platform[0], carriers[0]) * mask[:, None]
+    w = dynamics.required_wrench(*slowed, wind=trajectory.wind) * mask
     near = None if trajectory.tensions is None else np.nan_to_num(trajectory.tensions(law.tau))
     tensions = solve_batch(A, w, robot.t_min, robot.t_max, t_ref=near, length=robot.length, rho=RHO).tensions
     missing = np.linalg.norm((w - (A @ tensions[:, :, None])[..., 0]) * robot.wrench_scale, axis=1)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from towline import Dynamics, InputError, Robot, TensionProblem, load, read_requirements
+from towline import Dynamics, InputError, Robot, TensionProblem, design, load, read_requirements
 from towline.layout import judgement
 from towline.layout.evaluation import Evaluation, rows_of
 from towline.layout.goal import goal_of
@@ -92,6 +92,9 @@ def test_the_least_accepted_margin_is_that_of_a_weak_robot():
     variables_of(robot, requirements_of(SIZE, 1e-4))  # 4 mN, of 98 mN
     with pytest.raises(InputError, match=r"margin must be at least 0.000981 N"):
         variables_of(robot, requirements_of(SIZE, 1e-5))
+    free = [{"part": "t_max", "range": {"min": 0.1, "max": 1}}]
+    found = design(robot, free=free, require=[{"poses": [list(robot.home)]}], time_limit=0.1)
+    assert found.requirements.margin == pytest.approx(0.1 * robot.weight)
 
 
 def test_the_margin_of_a_layout_out_of_reach_is_the_largest_distance(monkeypatch):
