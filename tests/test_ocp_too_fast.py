@@ -130,7 +130,7 @@ def test_a_short_turn_about_an_origin_is_feasible_though_the_centre_of_mass_is_e
 
 @pytest.mark.parametrize("name", ["ipanema-1", "cogiro", "planar-4"])
 def test_a_power_that_no_tensions_need_is_the_least_that_is_feasible(name):
-    """Half a percent less is proven infeasible; a little more, for what happens between instants, has a plan."""
+    """A percent less is proven infeasible; with a little more an audit finds tensions, without a program."""
     robot = load(name)
     start = np.array(robot.home[:3])
     line = {"kind": "line", "start": start.tolist(), "end": (start + np.array([0.3, 0.0, 0.2])).tolist()}
@@ -147,10 +147,11 @@ def test_a_power_that_no_tensions_need_is_the_least_that_is_feasible(name):
     assert planned(0.99 * least).status is MotionStatus.INFEASIBLE
     both = {"winch_power": 0.99 * least, "own": (WinchPower(robot, 2 * least),)}
     assert plan(robot, task | {"limits": both}).audit.excess[0].value == pytest.approx(least)
-    enough = planned(1.03 * least)
+    enough = planned(1.003 * least)
     assert enough.feasible
+    assert enough.deviation is None
     row = int(np.abs(enough.audit.times - moment).argmin())
-    assert (np.abs(after - before) / (2 * rate) * enough.audit.tensions[row]).max() <= 1.03 * least * (1 + 1e-3)
+    assert (np.abs(after - before) / (2 * rate) * enough.audit.tensions[row]).max() <= 1.003 * least * (1 + 1e-3)
 
 
 @pytest.mark.parametrize("share", [0.99, 1.01])

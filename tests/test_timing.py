@@ -170,14 +170,25 @@ def test_motors_of_winches_give_the_minimum_time_of_an_optimal_control_program(s
     assert any("winch_force" in each.limit for each in fastest.law.bottlenecks)
 
 
-def test_of_two_cables_the_one_without_a_motor_pulls_what_a_motor_cannot():
-    """A motor that accelerates its winch, and a cable beside it that takes the remainder of the load."""
-    mass, inertia, force, height = 2.0, 3.0, 40.0, 1.5
+@pytest.mark.parametrize(("inertia", "force"), [(3.0, 40.0), (300.0, 40.0), (2e4, 40.0), (3.0, 1.0)])
+def test_of_two_cables_the_one_without_a_motor_pulls_what_a_motor_cannot(inertia, force):
+    """A motor that accelerates its winch, and a cable beside it that takes the remainder of the load.
+
+    The winch of 300 kg holds the platform up when it should fall; a motor that can just hold t_min accelerates nothing.
+    """
+    mass, height = 2.0, 1.5
     data = point_mass([[0, 0, 4], [0, 0, 4]], ["z"], mass=mass, t_min=1.0, t_max=40.0).model_dump()
     data["cables"][0]["winch"] = {"inertia": inertia, "force_max": force, "speed_max": 99.0}
     robot = Robot.model_validate(data)
     fastest = time_along(robot, along(straight(robot, [0, 0, height, 0, 0, 0])))
-    up, down = (40 + force - mass * GRAVITY) / (mass + inertia), GRAVITY - 2 / mass
+    if force == 1.0:
+        assert fastest.status is MotionStatus.NOT_FOUND
+        return
+    up, down = (40 + force - mass * GRAVITY) / (mass + inertia), (mass * GRAVITY - 1 + force) / (mass + inertia)
+    if inertia == 3.0:
+        named = {each.limit for each in fastest.law.bottlenecks}
+        assert named == {"t_max of cable 2; winch_force of cable 1", "t_min of cables 1, 2"}
+    up, down = min(up, (force - 1) / inertia), min(down, GRAVITY - 2 / mass)  # with 1 N where a motor could pull less
     assert fastest.feasible
     assert fastest.duration == pytest.approx(np.sqrt(2 * height * (1 / up + 1 / down)), rel=2e-4)
 

@@ -23,11 +23,7 @@ from .streams import Reader, at_times
 
 MOST_ALIGNED = 200_000  # poses
 FAR_APART = 0.1  # [s] between clocks in one file; calibration and replay find smaller offsets themselves
-STEP, FEWEST, MOST_COMPARED = (
-    0.05,
-    0.5,
-    300,
-)  # [s] of a search, share of the samples that must overlap, and their number
+STEP, FEWEST, MOST_COMPARED = 0.05, 0.5, 300  # [s] of a search, share of samples that must overlap, and their number
 LONGEST = 1e4  # [s] before and after the middle of a log
 MOST_TRIED, LONGEST_STEP = 8000, 0.2  # offsets, and [s] of a search in a long log
 # Another clock is better if the spread of lengths falls below this fraction; second: if orientations are not recorded.
@@ -200,9 +196,11 @@ def set_clocks_of_carriers(
         tried.append({})
         for index in others:
             own = [] if seen is not None else _seen_from(robot, index, tracks[index], all_, given)
-            arms = [robot.home_attachments[list(robot.carrier_of_cable).index(i)] for i in (index, first)]
-            shift = np.pad(arms[0] - arms[1], (0, 3))  # from poses, by the attitude at home, to the ends of cables
-            ends = own[number]._replace(poses=own[number].poses + shift) if len(own) == len(ways) else None
+            ends = None
+            if len(own) == len(ways):
+                arms = [robot.home_attachments[list(robot.carrier_of_cable).index(i)] for i in (index, first)]
+                shift = np.pad(arms[0] - arms[1], (0, 3))  # from poses, by the attitude at home, to the ends of cables
+                ends = own[number]._replace(poses=own[number].poses + shift)
             tried[-1][index] = _offset(robot, index, tracks[index], way, ends)
     notes: list[str] = []
     for index, (offset, _) in min(tried, key=lambda one: sum(left for _, left in one.values())).items():

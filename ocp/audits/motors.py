@@ -30,9 +30,10 @@ def within_motors(
             reflected = its - tensions[:, limit.cables]
             most[:, limit.cables] = limit.high - reflected
             least[:, limit.cables] = -limit.high - reflected
-        elif isinstance(limit, WinchPower):
-            slower = limit.high / np.maximum(np.abs(its), limit.high)
-            most = np.where(slower < 1, np.minimum(most, slower * tensions), most)
+        elif isinstance(limit, WinchPower) and limit.soft is None:
+            held = scenario.in_force(limit, times)[:, None] & (its != 0)
+            own = np.divide(limit.high * tensions, np.abs(its), np.full_like(most, np.inf), where=held)
+            most = np.minimum(most, own)
     exceeded = ((tensions > np.minimum(high, most)) | (tensions < np.maximum(low, least))).any(axis=1)
     if not exceeded.any():
         return tensions

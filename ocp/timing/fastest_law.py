@@ -74,7 +74,7 @@ def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: floa
         elif reached[k].max(initial=0.0) >= REACHED:
             reached_limits.append(names[int(reached[k].argmax())])
         else:
-            problem = wrench_problem(parametrised.robot, A[k], w[k], low, np.minimum(high, force[k]))
+            problem = wrench_problem(parametrised.robot, A[k], w[k], low, np.clip(force[k], low, high))
             reached_limits.append(_tensions(problem, force[k] < high))
     at, stretches, first = path.law(edges)[0], [], 0
     for limit, run in groupby(reached_limits):

@@ -119,8 +119,8 @@ def phase_plane(
     """Return the limits at the points s (N,).
 
     Tensions are less `margin` [N], wrenches `reserve` (N,) [N] inside what these tensions give, and the other limits
-    reduced by the share `shrink`. Raises `InputError` if motion along
-    the path needs wrenches outside the span of the cables.
+    reduced by the share `shrink`. Raises `InputError` if motion along the path needs wrenches outside the span of the
+    cables.
     """
     robot = parametrised.robot
     platform, carriers = parametrised.at(s)
@@ -132,18 +132,18 @@ def phase_plane(
     available = facets(A, low, high)
     _check_span(s, wrench, available)
     force, winches = parametrised.motor_force, None
-    rows = parametrised.acceleration_rows(platform, carriers, limits, shrink)
+    accelerations = parametrised.acceleration_rows(platform, carriers, limits, shrink)
     if (own := np.isfinite(force)).any():
         winches = Winches(available.normals @ A, parametrised.reflected(platform, carriers), force, low, high)
-        P, Q = (part[:, own] / robot.force_scale for part in winches.reflected)
-        c = np.append(low[own] - force[own], -high[own] - force[own]) / robot.force_scale
-        rows.append((np.hstack([-P, P]), np.hstack([-Q, Q]), np.broadcast_to(c, (len(s), len(c)))))
+        P, Q = (part[:, own] / force[own] for part in winches.reflected)
+        c = np.append(low[own] / force[own] - 1, -high[own] / force[own] - 1)
+        accelerations.append((np.hstack([-P, P]), np.hstack([-Q, Q]), np.broadcast_to(c, (len(s), len(c)))))
     # The reserve must not turn the only wrench into none.
     low, high, inside = available.low, available.high, np.reshape(reserve, (-1, 1))
     middle = (low + high) / 2
     available = replace(available, low=np.minimum(low + inside, middle), high=np.maximum(high - inside, middle))
     x_max = (parametrised.speed_limit(platform, carriers, limits) * (1 - shrink)) ** 2
-    return PhasePlane(wrench, available, x_max, rows, winches)
+    return PhasePlane(wrench, available, x_max, accelerations, winches)
 
 
 def proofs(parametrised: ParametrisedPath, limits: PathLimits, s: np.ndarray, margin: float) -> list[Proof]:

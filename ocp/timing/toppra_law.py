@@ -17,7 +17,7 @@ from typing_extensions import override
 
 from ...base.quiet import quiet
 
-STEEPNESS = 1e-2  # of the largest row along u; toppra drops 1e-8 of x at each step, which must be little beside x
+STEEPNESS = 1e-4  # of the largest row along u; toppra drops 1e-8 of x at each step, which must be little beside x
 UNLIMITED = 1e7  # x in toppra's units that no limit has stopped; its own bounds are at 1e8
 ROUNDING = 1e-12  # of a row along u: less is zero
 TOGETHER = 16  # half-planes that toppra takes together: it multiplies them by a dense matrix of twice their number
@@ -86,7 +86,7 @@ def fastest(s: np.ndarray, rows: Rows) -> Law:
     """Return the largest x at every s, (N,) rising from 0, of a motion from rest to rest."""
     # Measured in this unit of length, u and x are numbers that toppra's absolute tolerances suit.
     steepest = float(np.abs(rows.a).max(initial=0.0))
-    unit = steepest / STEEPNESS if steepest > ROUNDING else 1.0
+    unit = np.sqrt(steepest / STEEPNESS) if steepest > ROUNDING else 1.0
     never, scaled = _normalised(Rows(rows.a / unit, rows.b / unit**2, rows.c, rows.x_max * unit**2))
     if never.any():
         return Law(None, int(np.argmax(never)))
@@ -99,8 +99,9 @@ def fastest(s: np.ndarray, rows: Rows) -> Law:
     if speeds is None:
         lost = np.flatnonzero(np.isnan(reach).any(axis=1))
         return Law(None, int(lost[-1]) if lost.size else 0)
-    if np.isnan(speeds).any():
-        return Law(None, int(np.flatnonzero(np.isnan(speeds))[0]))
+    stuck = ~(speeds[1:] + speeds[:-1] > 0)  # nan, or at rest until the next point
+    if stuck.any():
+        return Law(None, int(np.argmax(stuck)))
     x = speeds**2
     return Law(x / unit**2, None, bool(x.max() > UNLIMITED))
 

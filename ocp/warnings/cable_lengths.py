@@ -6,6 +6,7 @@ from ...base.text import quantity
 from .instants import Instants
 
 SHORT = 0.05  # of a cable's length at home
+SLACK = -1e-6  # of the weight: less tension than that is slack
 
 
 def short_cables(seen: Instants) -> list[str]:
@@ -49,7 +50,7 @@ def fixed_cables(seen: Instants, tensions: np.ndarray) -> list[str]:
     change = np.linalg.pinv(A, 1e-6) @ (A @ (root * (tensions - tensions[0]))[..., None])
     kept = tensions[0] + change[..., 0] / root
     row, cable = np.unravel_index(int(kept.argmin()), kept.shape)
-    if kept[row, cable] >= 0:
+    if kept[row, cable] >= SLACK * robot.force_scale:
         return []
     planned = quantity(tensions[row, cable], "N", 2)
     return [
