@@ -182,6 +182,8 @@ def test_axes_with_other_names():
         assert [one.name for one in found.position] == names
         assert [one.name for one in found.orientation] == turned
     assert not fields_of([table(["l0", "u", *(f"position[{i}]" for i in range(8))])]).position
+    plane = fields_of([table(["ee_y", "ee_x", "theta"])], free="x z pitch")  # of a planar robot, in another plane
+    assert [one.name for one in (*plane.position, *plane.orientation)] == ["ee_x", "ee_y", "theta"]
 
 
 @pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind, names in NAMES.items() for name in names])

@@ -306,6 +306,12 @@ def test_units_of_times_since_the_start(step, unit):
     assert time_unit(12_345_000 + step * np.arange(50)) == unit
 
 
+def test_many_small_steps_are_milliseconds_if_seconds_would_be_hours():
+    """100 Hz for 10 s; an hour with 400 samples and one at 10 Hz are in seconds."""
+    assert time_unit(10 * np.arange(1000)) == "ms"
+    assert time_unit(10 * np.arange(400)) == time_unit(np.arange(3600)) == time_unit(0.1 * np.arange(36_000)) == "s"
+
+
 def test_the_title_of_a_sheet_is_no_part_of_the_names(tmp_path):
     (tmp_path / "log.csv").write_text("Run 12;;\ntime_usec;l1 [cm];X [m]\n0;101,5;1,5\n100000;102;1,6\n")
     topic = from_csv((tmp_path / "log.csv").read_bytes(), "log.csv").topics[""]

@@ -120,8 +120,8 @@ def _ways_round(
         at = np.concatenate([leg + share for leg, (share, _) in own.items()])
         through = np.vstack([poses for _, poses in own.values()])
         for shape, how in SHAPES if isinstance(path, LinePath) else ((None, "through"),):
-            legs = {"kind": "waypoints", "points": through.tolist(), "shape": shape}
-            way = along(scenario, WaypointPath.model_validate(legs) if shape else _through(path, through, at))
+            fields = {"kind": "waypoints", "points": through.tolist(), "shape": shape}
+            way = along(scenario, WaypointPath.model_validate(fields) if shape else _through(path, through, at))
             if not exceeds(way, np.linspace(0.0, way.duration, LOOKS), rates=False).any():
                 yield how, through[:, :3], at % 1 > 0, way
 
