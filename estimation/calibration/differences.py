@@ -62,12 +62,8 @@ class LogPart(NamedTuple):
         samples, by displaced anchors and attachments. The last c columns are the penalties for these.
         """
         run = runs(self.robot, self.table, *self.at(way))
-        explained = [np.ones((*run.lengths.shape, 1))]
-        if len(self.y) >= FEWEST[0]:
-            explained.append(run.by_geometry[..., :3])
-        if len(self.y) >= FEWEST[1]:
-            explained.append(run.by_geometry[..., 3:6])
-        D = np.concatenate(explained, axis=2)  # (m, N, c)
+        ends = 3 * sum(len(self.y) >= fewest for fewest in FEWEST)  # of their coordinates
+        D = np.concatenate([np.ones((*run.lengths.shape, 1)), run.by_geometry[..., :ends]], axis=2)  # (m, N, c)
         count, c = D.shape[1:]
         # A displacement by PLAUSIBLE costs as much as differences of the stated size.
         length = float(np.nanmedian(run.lengths))
@@ -93,11 +89,15 @@ class LogPart(NamedTuple):
         done = rounds == 0 or not wrong.any() or wrong.mean() > MOST_WRONG
         return (self, left) if done else self.without(wrong).sound(rounds - 1)
 
-    def roughness(self, way: Interpretation) -> float:
-        """Return the median difference of lengths and readings that offsets do not explain, by a few samples [m]."""
+    def roughness(self, ways: list[Interpretation]) -> np.ndarray:
+        """Return the median difference that offsets do not explain in each of some ways (w,), by a few samples [m]."""
         few = self.without(np.arange(len(self.y)) % STRIDE > 0)
-        apart = runs(few.robot, few.table, *few.at(way)).lengths - way.factor * few.y.T
-        return float(np.median(np.abs(apart - np.median(apart, axis=1, keepdims=True))))
+        position, rotation, carriers = zip(*map(few.at, ways), strict=True)
+        moved = None if few.carriers is None else np.concatenate(carriers)
+        lengths = runs(few.robot, few.table, np.concatenate(position), np.concatenate(rotation), moved).lengths
+        y = np.stack([way.factor * few.y.T for way in ways], axis=1)  # (m, w, N)
+        apart = lengths.reshape(y.shape) - y
+        return np.asarray(np.median(np.abs(apart - np.median(apart, axis=2, keepdims=True)), axis=(0, 2)))
 
 
 def medians(left: np.ndarray, count: int) -> np.ndarray:

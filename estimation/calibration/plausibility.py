@@ -235,9 +235,9 @@ def _explanations(log: LogPart, e: np.ndarray, noise: float) -> tuple[list[_Way]
     ways: list[_Way] = []
     turns: list[tuple[np.ndarray, _Way]] = []
     tried = interpretations(bool(np.ptp(log.angles, axis=0).any()))
-    base, rough = log.parts(tried[0]), HOPELESS * log.roughness(tried[0])
-    for way in tried:
-        if way.turned and log.roughness(way) > rough:
+    base, rough = log.parts(tried[0]), log.roughness(tried)
+    for way, own in zip(tried, rough, strict=True):
+        if way.turned and own > HOPELESS * rough[0]:
             continue
         lengths, y = log.parts(way) if way.placed is not tried[0].placed or way.turned else base
         both = np.stack([lengths[:, None] - sign * way.factor * y for sign in (1, -1)]) / way.factor
