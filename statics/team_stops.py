@@ -340,13 +340,13 @@ def _wrenches_of_forces(robot: Robot, pose: np.ndarray) -> np.ndarray:
 def _worst(rows: list[Row], times: np.ndarray, begins_inside: bool = True) -> list[tuple[float, str]]:
     """Return the largest excess of each stop, relative to a limit's range, and the text of that limit.
 
-    Unless a stop should begin inside, so much as it has first is no excess.
+    Unless a stop should begin inside, so much as it has first is no excess. What is undefined is infinitely much.
     """
     names, values = [row[0] for row in rows], np.stack([row[1] for row in rows])  # (k, d, n)
     low, high = np.array([row[2:] for row in rows]).T[..., None, None]  # (k, 1, 1) each
     floor = low if begins_inside else np.minimum(low, values[..., :1])
     ceiling = high if begins_inside else np.maximum(high, values[..., :1])
-    beyond = np.maximum(floor - values, values - ceiling) / (high - low)
+    beyond = np.where(np.isnan(values), np.inf, np.maximum(floor - values, values - ceiling) / (high - low))
     worst = [(0.0, "")] * len(times)
     for d, excess in enumerate(beyond.max(axis=(0, 2)).tolist()):
         if excess > ACCEPTED:

@@ -119,6 +119,21 @@ def test_noise_of_accelerations_is_not_extrapolated():
     assert np.abs(acceleration).max() < 3
 
 
+def test_a_stop_of_which_nothing_is_known_is_not_feasible(made):
+    """Without weight and acceleration no cable has a tension, and so no direction."""
+    robot, speed = Robot.model_validate({**made[0].model_dump(), "gravity": [0, 0, 0]}), np.eye(6)[0]
+
+    def at(times):
+        moved, homes = times[:, None] * speed, (robot.home, robot.carrier_home[:, None])
+        platform, carriers = ((home + moved, 0 * home + 0 * moved + speed, 0 * home + 0 * moved) for home in homes)
+        return platform, tuple(part.swapaxes(0, 1) for part in carriers)
+
+    with np.errstate(all="ignore"):
+        its = team_stop_along(robot, Trajectory(1.0, at), 0.5)
+    assert its.excess == np.inf
+    assert its.limit
+
+
 @pytest.mark.parametrize("together", [True, False])
 def test_a_plan_that_ends_while_the_team_moves_goes_on_smoothly(made, together):
     """Velocities are the derivatives of poses, accelerations those of velocities, and nothing jumps at the end."""
