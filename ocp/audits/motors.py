@@ -34,7 +34,7 @@ def within_motors(
             held = scenario.in_force(limit, times)[:, None] & (its != 0)
             own = np.divide(limit.high * tensions, np.abs(its), np.full_like(most, np.inf), where=held)
             most = np.minimum(most, own)
-    exceeded = ((tensions > np.minimum(high, most)) | (tensions < np.maximum(low, least))).any(axis=1)
+    exceeded = np.any((tensions > np.minimum(high, most)) | (tensions < np.maximum(low, least)), axis=1)
     if not exceeded.any():
         return tensions
     chosen = tensions.copy()

@@ -130,7 +130,7 @@ def _changed(scenario: Scenario, makers: Sequence[Maker], shares: np.ndarray) ->
 
 def _largest(at: Callable[[float], Scenario], low: float = 0.0, high: float = 1.0, rates: bool = True) -> float:
     """Return the largest share between two whose scenario may be feasible; the lowest if none is known to be."""
-    for _ in range(OF_PROOFS if by_programs(at(1.0)) else HALVINGS):
+    for _ in range(OF_PROOFS if (most := _legal(at, 1.0)) and by_programs(most) else HALVINGS):
         middle = (low + high) / 2
         varied = _legal(at, middle)
         low, high = (middle, high) if varied and _may_be_feasible(varied, rates) else (low, middle)
@@ -146,7 +146,7 @@ def _planned(search: Search, at: Callable[[float], Scenario], name: str) -> tupl
         plan = None if varied is None else planned(search, varied, name, guess)
         return None if plan is None else (part, plan)
 
-    if not by_programs(at(1.0)):
+    if not ((most := _legal(at, 1.0)) and by_programs(most)):
         return next(filter(None, map(tried, RESERVES)), None)
     best: tuple[float, Plan] | None = None
     for part in OF_PROGRAMS:

@@ -252,14 +252,11 @@ def planned(search: Search, scenario: Scenario, name: str, guess: Deviation | No
         return Plan(scenario, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0) if audit.passed else None
     if infeasible_ends(scenario) is not None:
         return None
-    with _beside(search, scenario) as beside:
-        if beside is None:
+    with _solved_beside(search, scenario, guess) as found:
+        if found is None:
             return None
-        outcome = beside.solve("program of a relaxation", _mesh(scenario), guess)
-        if not outcome.success:
-            return None
-        refine(beside, outcome)
-        plan = beside.best()
+        refine(*found)
+        plan = found[0].best()
     return plan if plan.feasible else None
 
 
@@ -285,35 +282,32 @@ def longer_durations(scenario: Scenario) -> tuple[float, float]:
 
 def solved(search: Search, scenario: Scenario, guess: Deviation | None) -> Outcome | None:
     """Return the solution of another scenario's program; None if there is none."""
-    with _beside(search, scenario) as beside:
-        if beside is None:
-            return None
-        outcome = beside.solve("program of a relaxation", _mesh(scenario), guess)
-    return outcome if outcome.success else None
-
-
-def _mesh(scenario: Scenario) -> Mesh:
-    """Return the mesh of a relaxation's program, with fewer steps than a large task, since the refinement adds some."""
-    steps = scenario.task.steps
-    return Mesh(steps if scenario.phases.all else min(steps, max(LARGE // max(scenario.count, 1), FEWEST)))
+    with _solved_beside(search, scenario, guess) as found:
+        return found and found[1]
 
 
 @contextmanager
-def _beside(search: Search, scenario: Scenario) -> Iterator[Search | None]:
-    """Yield the search for a motion of another scenario, in the time that the task's limit left.
+def _solved_beside(
+    search: Search, scenario: Scenario, guess: Deviation | None
+) -> Iterator[tuple[Search, Outcome] | None]:
+    """Yield the search for a motion of another scenario, in the time that the task's limit left, and its solution.
 
     Its programs may take a part of the iterations that are left for offers: with a limit in seconds, a busy machine
-    would find other results. None if too few are left; then the search for offers is cut short.
+    would find other results. None if too few are left, so that the search for offers is cut short, or if there is no
+    solution. The mesh has fewer steps than a large task, since the refinement adds some.
     """
     left = min(max(search.effort, LEAST_EFFORT), MOST_EFFORT) - search.offers_effort
-    most = int(PART * left / (max(scenario.count, 1) * scenario.task.steps))
+    count, steps = max(scenario.count, 1), scenario.task.steps
+    most = int(PART * left / (count * steps))
     if most < LEAST_ITERATIONS:
         search.cut_short = True
         yield None
         return
-    most = min(most, MOST_ITERATIONS)
-    beside = Search(scenario, {}, search.progress, scenario.task.time_limit - search.solve_s, most)
-    yield beside
+    left_s = scenario.task.time_limit - search.solve_s
+    beside = Search(scenario, {}, search.progress, left_s, min(most, MOST_ITERATIONS))
+    mesh = Mesh(steps if scenario.phases.all else min(steps, max(LARGE // count, FEWEST)))
+    outcome = beside.solve("program of a relaxation", mesh, guess)
+    yield (beside, outcome) if outcome.success else None
     search.offers_effort += beside.effort
 
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from ...base.text import quantity
 from ...models import Robot
-from ...models.part import Vector3
 from ..audits.audit import Audit
 from ..audits.excess import TENSIONS
 from ..plan import Plan
@@ -22,7 +21,6 @@ from ..tasks.phase import Load
 from ..tasks.scenario import ATTITUDE, Scenario
 from ..tasks.status import MotionStatus
 from ..tasks.task import Tube
-from ..tasks.wind_set import WindBox, WindDisc
 from .largest_share import Change, Variation, by_programs, exceeds, largest_share, rests, together
 from .other_paths import near_home, nearer_end, other_yaws, shifted_path, shortest_shift, smaller_circle
 from .past_regions import IN_THE_WAY, past_regions
@@ -193,27 +191,17 @@ def _less_margin(scenario: Scenario) -> Change | None:
 def _less_wind(scenario: Scenario) -> Change | None:
     """Return the change of the wind, or set of winds, to a weaker one from the same directions."""
     wind = scenario.task.wind
-    fastest = max(_speeds(wind), default=0.0)
+    given = {} if wind is None else {"wind": wind} if isinstance(wind, tuple) else wind.model_dump()
+    fastest = max((float(np.linalg.norm(value)) for value in given.values()), default=0.0)
     if wind is None or not fastest:
         return None
 
     def with_wind(share: float) -> Variation:
-        if isinstance(wind, tuple):
-            weaker: Any = tuple(share * value for value in wind)
-        else:
-            fields = {name: (share * np.array(value)).tolist() for name, value in wind.model_dump().items()}
-            weaker = type(wind).model_validate(fields)
+        fields: Any = {name: (share * np.array(value)).tolist() for name, value in given.items()}
+        weaker = tuple(fields["wind"]) if isinstance(wind, tuple) else type(wind).model_validate(fields)
         return with_task(scenario, wind=weaker), share * fastest, f"instead of {quantity(fastest, 'm/s')}"
 
     return Change("wind", "m/s", with_wind)
-
-
-def _speeds(wind: Vector3 | WindBox | WindDisc | None) -> list[float]:
-    """Return the speeds [m/s] of a wind, of the corners of a box of winds or of the fastest of a disc."""
-    if isinstance(wind, WindDisc):
-        return [wind.speed]
-    corners = [wind.min, wind.max] if isinstance(wind, WindBox) else [] if wind is None else [wind]
-    return [float(np.linalg.norm(corner)) for corner in corners]
 
 
 def _lighter_load(scenario: Scenario) -> Change | None:

@@ -258,8 +258,8 @@ def _piece(
     plane, weight = phase_plane(parametrised, limits, inside, margin, reserve, shrink), parametrised.robot.force_scale
     rows = plane.rows(weight)
     law = fastest(s - s[0], Rows(*rows, plane.x_max))
-    for _ in range(MOST_CUTS if plane.winches is not None else 0):
-        if law.x is None or law.unlimited:
+    for _ in range(MOST_CUTS):
+        if plane.winches is None or law.x is None or law.unlimited:
             break
         known, u, x = rows[0].shape[1], np.diff(law.x) / (2 * np.diff(s)), law.x[:, None]
         for each in (np.append(u, u[-1]), np.append(u[0], u)):  # those after and before each point
