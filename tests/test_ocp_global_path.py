@@ -265,7 +265,5 @@ def test_places_on_the_axis_of_a_swivelling_pulley_are_not_tried():
     )
     rest = AtRest(scenario_of(WALL_WITH_A_HOLE, robot), 1.0)
     poses = np.array([[-0.4, 0, 1, 0, 0, 0], [*robot.home_anchors[0] - [0, 0, 1], 0, 0, 0]])
-    carriers = np.zeros((2, len(robot.carriers), 6))
-    kept = rest(poses, carriers)
+    kept = rest(poses, np.zeros((2, len(robot.carriers), 6)))
     assert kept.slack[0] > 0 > kept.slack[1]
-    assert rest._balance(poses, carriers)[-1]  # the cables give all forces elsewhere, so nothing missing is tolerated

@@ -103,14 +103,13 @@ class AtRest:
         scenario, robot = self.scenario, self.scenario.robot
         A = scaled(scenario, scenario.dynamics.wrench_matrix(platform, carriers))
         known = np.isfinite(A).all(axis=(1, 2))  # false where an attachment lies on the axis of a pulley or inside it
-        A[~known] = np.eye(6, robot.m)  # one of less rank would make the cables few for all poses
+        A[~known] = 0.0
         if self._weight is not None:
             w = np.broadcast_to(self._weight, platform.shape)
         else:
             still = np.zeros_like(platform)
             w = scaled(scenario, scenario.dynamics.required_wrench(platform, still, still, wind=scenario.wind))
         few, inverse = few_and_inverse(A, len(robot.platform.dof))
-        A[~known] = 0.0
         tensions = np.clip((inverse @ w[..., None])[..., 0], *self._bounds)
         missed = np.linalg.norm((A @ tensions[..., None])[..., 0] - w, axis=1)
         return A, w, tensions, known & (missed <= (MISSED if few else BALANCED) * robot.force_scale), not few
