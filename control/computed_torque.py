@@ -1,6 +1,7 @@
 """`ComputedTorque`: desired acceleration, the wrench required for it, and the tensions that produce this wrench."""
 
 from collections.abc import Mapping
+from math import ceil
 from typing import Any
 from warnings import warn
 
@@ -14,7 +15,7 @@ from ..models.files import AnyRobot, as_robot
 from ..models.record import record_of
 from ..solvers.in_place import InPlace
 from .as_floats import ROUNDING, as_floats, is_time, measured_at, rows_of
-from .bandwidths import HELD, SWINGING, bandwidths_for, place_for
+from .bandwidths import DELAY, HELD, PERIOD, SWINGING, bandwidths_for, place_for
 from .carried_load import CarriedLoad
 from .command import NOTHING, NOWHERE, PLANNED, SHIFTED, SOFT, Command
 from .controllability import uncontrolled
@@ -22,7 +23,7 @@ from .controller import Controller
 from .deviation import Deviation
 from .fallback import NEGLIGIBLE, answer_others
 from .lag import WINCHES_KEEP, Lead, rotor_lead
-from .late_states import LateStates
+from .late_states import OLDEST, LateStates
 from .noise import Noise
 from .one_at_a_time import OneAtATime
 from .records import CABLE, CARRIER, PLATFORM, TURNING
@@ -60,8 +61,8 @@ class ComputedTorque(Controller):
             lowered, and that of `observer` with it, because the loop is unstable from 1 / b on. Both are restored after
             two steps that are closer together.
             A given bandwidth is kept, with a warning. If carriers fly, all bandwidths are lowered by the same factor,
-            because their attitude loops need steps of at most 0.75 / `attitude`. Carriers that correct errors without
-            flying need steps of at most 0.75 / `carrier_bandwidth`.
+            because their attitude loops need steps of at most 0.75 / `attitude`, less 1.5 times the mean age of states
+            by their `time`. Other carriers that correct errors need steps of at most 0.75 / `carrier_bandwidth`.
         damping: Damping ratio z: Kd = 2 z b.
         integral: Ki [1/s^3], a number or one for each coordinate. It pauses while the status is not "as planned".
         observer: Bandwidth of the estimates of the disturbance and of forces on flying carriers [rad/s]; 0: no
@@ -186,7 +187,7 @@ class ComputedTorque(Controller):
         """Create the memory for one robot, or for each row of a batch."""
         m, count = self.robot.m, len(self.robot.carriers)
         self._time: float | None = None
-        self._elapsed = 0.0
+        self._elapsed = self._age = 0.0
         self._carried.reset()
         self._robot = record_of(self.robot)
         self._seen, self._sent_lately = 0.0, LateStates(rows * m)
@@ -255,23 +256,23 @@ class ComputedTorque(Controller):
             raise InputError(f"time must be a finite number [s], got {shown(time)}")
         time, rows = float(time), rows_of(state)
         self._is_one = rows is None
-        count = 1 if rows is None else rows
-        if count != len(self._wanted):
+        if (count := 1 if rows is None else rows) != len(self._wanted):
             self._begin(count)
         dt = 0.0 if self._time is None else time - self._time
         if not (dt > 0 or self._time is None):
             raise InputError(
                 f"time must increase from step to step until reset(), got {time:g} s after {self._time:g} s"
             )
-        if dt > self._longest and not 0 < self._elapsed <= self._longest:
-            self._slow_down(min(dt, self._elapsed or dt))
-        elif self._usual_longest < self._longest < np.inf and 0 < max(dt, self._elapsed) <= self._usual_longest:
-            self._speed_up()
         if reference.load is not self._carried.load:
-            self._carry(reference.load, -np.inf if self._time is None else time)
+            self._robot = self._carried.change(reference.load, -np.inf if self._time is None else time)
         self._senses = state.tensions is not None
         seen = time if state.time is None else measured_at(state.time, time)
         since = 0.0 if self._time is None else seen - self._seen
+        late = self._late_by(time - seen, dt) if self._flies else 0.0
+        if dt + late > self._longest and not 0 < self._elapsed <= self._longest - late:
+            self._slow_down(min(dt, self._elapsed or dt), late)
+        elif self._usual_longest < self._longest < np.inf and 0 < max(dt, self._elapsed) <= self._usual_longest - late:
+            self._speed_up()
         own, scales = (self._robot, self._settings), (self._problems.length, *self._deviation.most)
         if self._ahead is not None:
             self._ahead.pass_time(dt, self._cables["last"])
@@ -316,9 +317,14 @@ class ComputedTorque(Controller):
         if sender._lead is not None and self._lead is not None:
             self._lead.agree(sender._lead)
 
-    def _slow_down(self, period: float) -> None:
-        """Lower bandwidths for commands that are held for a period [s], or warn of given ones."""
-        self._longest, most = self._slow_loops.slow_down(period)
+    def _late_by(self, age: float, dt: float) -> float:
+        """Return the time between steps that delays attitude loops as much as the mean age of states [s]."""
+        self._age += (1.0 if self._time is None else min(dt, 1.0)) * (min(age, OLDEST) - self._age)
+        return ceil(1e3 * self._age - ROUNDING) / 1e3 * PERIOD / DELAY
+
+    def _slow_down(self, period: float, late: float) -> None:
+        """Lower bandwidths for late states and commands that are held for a period [s], or warn of given ones."""
+        self._longest, most = self._slow_loops.slow_down(period + late)
         self._platform["attitude"] = np.minimum(self._platform["attitude"], self._settings["attitude"])
         if most < np.inf:
             warn(f"bandwidth must be at most {most:.3g} rad/s for steps {period:.3g} s apart", stacklevel=2)
@@ -327,10 +333,6 @@ class ComputedTorque(Controller):
         """Use the usual bandwidths."""
         self._slow_loops.speed_up()
         self._platform["attitude"], self._longest = self._attitude, self._usual_longest
-
-    def _carry(self, load: Any, time: float) -> None:
-        """Use the model of the robot with a load from a time on [s]."""
-        self._robot = self._carried.change(load, time)
 
     def _command(
         self, tensions: np.ndarray, answered: np.ndarray, proof: tuple[np.ndarray, np.ndarray], alone: bool
@@ -358,7 +360,12 @@ class ComputedTorque(Controller):
             lacking = control_thrusts(self._elapsed, self._robot, self._settings, *given)
             actuation = self._actuation.copy() if self._lead is None else self._lead.sent(self._actuation)
             if lacking > self._negligible:
-                answered, proof = self._with_thrust_lacking(answered, proof)
+                most = self._of_carriers["lacking"].max(axis=1)
+                lacks = (answered == PLANNED) & (most > self._negligible)
+                answered, proof = (
+                    np.where(lacks, SOFT, answered).astype(np.int8),
+                    (proof[0], np.where(lacks, most, proof[1])),
+                )
         tensions = self._sent(tensions)
         if self._are_far:
             answered = self._deviation.status(answered, self._measured[:, 0, :6], self._wanted[:, :6])
@@ -372,14 +379,6 @@ class ComputedTorque(Controller):
         unknown = ~np.isfinite(carriers).all(axis=(2, 3))
         measured = self._measured[:, 1:].reshape(*unknown.shape, 2, 6)
         carriers[unknown, :2], carriers[unknown, 2] = measured[unknown], 0.0
-
-    def _with_thrust_lacking(
-        self, answered: np.ndarray, proof: tuple[np.ndarray, np.ndarray]
-    ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
-        """Return the status of each row and the missing thrust, where carriers have too little for the tensions."""
-        lacking = self._of_carriers["lacking"].max(axis=1)
-        lacks = (answered == PLANNED) & (lacking > self._negligible)
-        return np.where(lacks, SOFT, answered).astype(np.int8), (proof[0], np.where(lacks, lacking, proof[1]))
 
     def _sent(self, wanted: np.ndarray) -> np.ndarray:
         """Return the commands to the winches that produce the desired tensions, (N, m) [N]."""

@@ -185,11 +185,11 @@ class Predictive(ComputedTorque):
         self._moved.reset()
 
     @override
-    def _slow_down(self, period: float) -> None:
+    def _slow_down(self, period: float, late: float) -> None:
         """Let a stage last as long as a command if references are as far apart, or warn of given stages."""
         longest, stage = self._longest, self._steps[0]
         if self._flies:
-            super()._slow_down(period)
+            super()._slow_down(period, late)
         if period <= self._longest_stage:
             longest = self._longest_stage
         elif not self._adapts:
@@ -200,7 +200,7 @@ class Predictive(ComputedTorque):
             )
         elif period <= min(PAUSE, self._preview.period + ROUNDING):
             longest, stage = period + ROUNDING, period
-        self._longest = min(longest, self._longest) if self._flies else longest
+        self._longest = min(longest + late, self._longest) if self._flies else longest
         if stage != self._steps[0] or self._turned != self._settings["attitude"]:
             self._lay_out(stage)
 

@@ -173,3 +173,12 @@ def test_slow_loops_are_compared_with_the_model(name, period):
     simulate(robot, robot.home, controller, duration=2.0, period=period, events=["cut 1 at 1.0"])
     assert controller.handed_over is not None
     assert 1.0 < controller.handed_over.time < 1.0 + 3.01 * period
+
+
+def test_attitude_loops_are_slowed_down_for_states_that_are_late():
+    """A delay of 40 ms makes loops of 40 rad/s, phi'' = -2 h phi' - h^2 phi, unstable: it permits 0.647 / 0.04 = 16."""
+    robot, controller = load("multi-quadrotor-3"), ComputedTorque(load("multi-quadrotor-3"))
+    noise, events = {"delay": 0.04, "stamped": True}, ["push 2 1 0 at 0.2 for 0.2"]
+    run = simulate(robot, robot.home, controller, duration=8.0, period=5e-3, noise=noise, events=events)
+    assert run.error[-200:].max() < 0.02 < 0.2 * run.error.max()
+    assert controller._platform["attitude"][0] < 16
