@@ -6,7 +6,7 @@ from ...solvers import solve_batch
 from ..limits.cables import WinchForce, WinchPower
 from ..tasks.scenario import Scenario
 
-SPARES = 0.0, 1e-6, 1e-4, 1e-2  # of the weight: by how much motors are exceeded where that is necessary, in order
+SPARES = 0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2  # of the weight: what exceeds motors where that is necessary, in order
 
 
 def within_motors(

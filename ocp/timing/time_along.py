@@ -154,7 +154,8 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
             reason = f"no time law passed the audit in {ATTEMPTS} attempts"
             return Plan(scenario, MotionStatus.NOT_FOUND, None, audited, 0.0, 0.0, reason, law=law)
         missing = _missing(law, audited)
-        known = (each for each in audited.excess if each.limit in KNOWN_LIMITS)
+        # What motors lack, a reserve makes up for, as for missing wrenches.
+        known = (each for each in audited.excess if each.limit in KNOWN_LIMITS and each.limit != WinchForce.name)
         excess = max([0.0, *(each.value / each.bound - 1.0 for each in known)])
         # A grid too coarse for a bend misses it by so much that as large a reserve would leave no tension at all.
         if intervals < MOST_INTERVALS and (missing.newtons.max() > COARSE * weight or excess > COARSE_EXCESS):
