@@ -75,7 +75,7 @@ def pose_problem(
 ) -> TensionProblem:
     """Build the tension problem of one instant, with the arguments of `tensions`.
 
-    Raises `InputError` if an argument has a wrong type, shape or value, or a cable has no length.
+    Raises `InputError` if an argument has a wrong type, shape or value, or a cable has no direction.
     """
     from ..models.motion import Motion
 
@@ -88,13 +88,20 @@ def pose_problem(
             raise InputError(f"{name} must be that of one instant, got an array of shape {array.shape}")
         if np.isfinite(array).all() and np.abs(array).max(initial=0.0) > LARGEST:
             raise InputError(f"{name} must be numbers up to {LARGEST:g}, got {np.abs(array).max():g}")
-    short = np.flatnonzero(~(dynamics.cable_lengths(pose, carrier_pose) > COINCIDENT))
+    lengths, A = dynamics.cable_lengths(pose, carrier_pose), dynamics.wrench_matrix(pose, carrier_pose)
+    undefined = np.flatnonzero((dynamics.robot.pulley_radii > 0) & np.isnan(A).any(axis=0))
+    if undefined.size:
+        raise InputError(
+            "pose must keep every attachment off the swivel axis and outside the sheave of its pulley, got one "
+            f"at which that of cable {undefined[0] + 1} is not"
+        )
+    short = np.flatnonzero(~(lengths > COINCIDENT))
     if short.size:
         raise InputError(
             f"pose must keep the ends of every cable apart, got one at which the ends of cable {short[0] + 1} coincide"
         )
     w = dynamics.required_wrench(*motion.at_rest_by_default(), wind=wind)
-    return wrench_problem(dynamics.robot, dynamics.wrench_matrix(pose, carrier_pose), w, t_ref=t_ref)
+    return wrench_problem(dynamics.robot, A, w, t_ref=t_ref)
 
 
 def wrench_problem(

@@ -6,6 +6,7 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
+from towline import InputError, tensions
 from towline.benchmarks.scenes import APART, GATE, LENGTH, LOAD, QUADROTOR, TREES, forest, window
 from towline.models import load
 from towline.ocp import Planner, plan
@@ -267,3 +268,6 @@ def test_places_on_the_axis_of_a_swivelling_pulley_are_not_tried():
     poses = np.array([[-0.4, 0, 1, 0, 0, 0], [*robot.home_anchors[0] - [0, 0, 1], 0, 0, 0]])
     kept = rest(poses, np.zeros((2, len(robot.carriers), 6)))
     assert kept.slack[0] > 0 > kept.slack[1]
+    for place in (poses[1], [*robot.home_anchors[0] - [0.05, 0, 0.01], 0, 0, 0]):
+        with pytest.raises(InputError, match=r"off the swivel axis and outside the sheave .* cable 1 is not"):
+            tensions(robot, place)
