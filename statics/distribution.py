@@ -89,17 +89,11 @@ def pose_problem(
         if np.isfinite(array).all() and np.abs(array).max(initial=0.0) > LARGEST:
             raise InputError(f"{name} must be numbers up to {LARGEST:g}, got {np.abs(array).max():g}")
     lengths, A = dynamics.cable_lengths(pose, carrier_pose), dynamics.wrench_matrix(pose, carrier_pose)
-    undefined = np.flatnonzero((dynamics.robot.pulley_radii > 0) & np.isnan(A).any(axis=0))
-    if undefined.size:
-        raise InputError(
-            "pose must keep every attachment off the swivel axis and outside the sheave of its pulley, got one "
-            f"at which that of cable {undefined[0] + 1} is not"
-        )
-    short = np.flatnonzero(~(lengths > COINCIDENT))
-    if short.size:
-        raise InputError(
-            f"pose must keep the ends of every cable apart, got one at which the ends of cable {short[0] + 1} coincide"
-        )
+    for cable in np.flatnonzero(~(lengths > COINCIDENT) | np.isnan(A).any(axis=0)):
+        kept, lost = "the ends of every cable apart", f"the ends of cable {cable + 1} coincide"
+        if dynamics.robot.pulley_radii[cable]:
+            kept, lost = "every cable off the axis and outside the sheave of its pulley", f"cable {cable + 1} is not"
+        raise InputError(f"pose must keep {kept}, got one at which {lost}")
     w = dynamics.required_wrench(*motion.at_rest_by_default(), wind=wind)
     return wrench_problem(dynamics.robot, A, w, t_ref=t_ref)
 

@@ -385,16 +385,8 @@ def _audited(robot: Robot, trajectory: Trajectory, law: _Law) -> tuple[Stop, flo
     tensions = solve_batch(A, w, robot.t_min, robot.t_max, t_ref=near, length=robot.length, rho=RHO).tensions
     missing = np.linalg.norm((w - (A @ tensions[:, :, None])[..., 0]) * robot.wrench_scale, axis=1)
     worst = int(np.argmax(missing))
-    found = Stop(
-        robot=robot,
-        begins=float(law.tau[0]),
-        ends=float(law.tau[-1]),
-        times=law.times,
-        platform=slowed,
-        carriers=_slowed(carriers, law),
-        tensions=tensions,
-        distance=float(np.linalg.norm(np.diff(platform[0][:, :3], axis=0), axis=1).sum()),
-        certificate=None,
-        limit=overloaded_winch(robot, law.times, dynamics.cable_lengths(platform[0], carriers[0]), tensions),
-    )
+    distance = float(np.linalg.norm(np.diff(platform[0][:, :3], axis=0), axis=1).sum())
+    limit = overloaded_winch(robot, law.times, dynamics.cable_lengths(platform[0], carriers[0]), tensions)
+    ends = float(law.tau[0]), float(law.tau[-1])
+    found = Stop(robot, *ends, law.times, slowed, _slowed(carriers, law), tensions, distance, None, limit)
     return found, float(missing[worst]), wrench_problem(robot, A[worst], w[worst])

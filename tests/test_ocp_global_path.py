@@ -269,5 +269,5 @@ def test_places_on_the_axis_of_a_swivelling_pulley_are_not_tried():
     kept = rest(poses, np.zeros((2, len(robot.carriers), 6)))
     assert kept.slack[0] > 0 > kept.slack[1]
     for place in (poses[1], [*robot.home_anchors[0] - [0.05, 0, 0.01], 0, 0, 0]):
-        with pytest.raises(InputError, match=r"off the swivel axis and outside the sheave .* cable 1 is not"):
+        with pytest.raises(InputError, match=r"off the axis and outside the sheave .* cable 1 is not"):
             tensions(robot, place)
