@@ -14,7 +14,9 @@ from towline.estimation.calibration import Measurements, calibrate
 from towline.estimation.calibration.balance import FeltTensions
 from towline.estimation.calibration.model import Model
 from towline.estimation.calibration.parameters import GROUPS, OF_CABLE, Parameters
+from towline.estimation.logs.load_cells import slack
 from towline.models import Robot, load
+from towline.models.files import as_robot
 
 from .framed import framed
 from .warm import towline as run
@@ -217,3 +219,15 @@ def test_wrong_requests_are_one_line():
         calibrate("cogiro", Measurements(np.full((30, 8), 9.0)), "stiffness")
     with pytest.raises(InputError, match=r"sigma.tensions must be a number from 1e-06 to 100, got 0"):
         Measurements(readings, sigma={"tensions": 0})
+
+
+def test_cables_without_tension_are_left_out():
+    """A slack cable is longer than the way to the platform, so its reading is left out; dead load cells show none."""
+    file = robot_file(ANCHORS, ATTACHMENTS, COM, MASS, [0, 0, 1.5, 0, 0, 0])
+    pull = np.full((8, 4), 40.0) + np.arange(8)[:, None]
+    pull[2, 1], pull[:, 3] = 0.3, 0.0
+    expected = np.zeros((8, 4), dtype=bool)
+    expected[2, 1] = True
+    for poses, left in ((None, expected), (np.zeros((8, 6)), 0 * expected)):
+        log = Measurements(np.full((8, 4), 3.0), poses, tensions=pull)
+        np.testing.assert_array_equal(slack(as_robot(file), log), left)

@@ -186,7 +186,7 @@ def test_equally_probable_errors_are_not_mended():
     log = Measurements(y, np.hstack([poses[:, :3], points.angles(turned.inv().as_matrix())]))
     found = mistake(robot, log)
     if found is not None and found.corrected is None:
-        with pytest.raises(InputError, match="must have one probable error to be corrected, got several"):
+        with pytest.raises(InputError, match="must have one probable error that is known, got: "):
             corrected(robot, log)
 
 

@@ -27,10 +27,10 @@ CLEARLY = 3.0  # times smaller differences
 EXPLAINED = 0.75  # of the turns from a constant orientation, which differences in another convention must be below
 VISIBLE = np.radians(3.0)  # smaller ones are noise, or small offsets of the readings
 TILTED = np.radians(20.0)  # of a world whose vertical is another one
+MOUNTED = np.radians(7.0)  # from right angles, of a sensor on the platform
 LIKELIER = 0.95  # of the sum of squares that a fit with the orientations as they are leaves
 SIMPLER = 2.0  # times the least sum of squares, which a simpler error may leave
 ENOUGH = 1e-3  # of the sum of squares, of a step that these fits need not take
-MOST_TURNED, ACCURATE = np.radians(30.0), np.radians(0.1)
 
 
 class Misread(NamedTuple):
@@ -64,6 +64,9 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
         R = rotation[rows] if way.turned is None else way.turned(rotation[rows], given.poses[rows, 3:])
         seen = Rotation.from_matrix(R)
         outer, inner = (expected * seen.inv()).mean(), (seen.inv() * expected).mean()
+        nearest = min(Rotation.create_group("O"), key=lambda one, inner=inner: (one.inv() * inner).magnitude())
+        # Sensors are mounted at right angles; a wrong CoM tilts the platform, too.
+        inner = nearest if (nearest.inv() * inner).magnitude() < MOUNTED else inner
         heading = Rotation.from_rotvec(2 * np.arctan2(up @ outer.as_quat()[:3], outer.as_quat()[3]) * up)
         # An inertial sensor knows the vertical: only its heading is wrong, unless its axes have another order.
         world = heading if (outer * heading.inv()).magnitude() < TILTED else outer
@@ -131,12 +134,11 @@ def _fitted(robot: Robot, given: Measurements) -> tuple[float, np.ndarray]:
 
 def _heading(robot: Robot, given: Measurements, rotation: Rotation, up: np.ndarray) -> Rotation:
     """Return the turn about the vertical after which the platform's mean turn from the orientations is 0, or none."""
-    from scipy.optimize import brentq
 
     def turn(angle: float) -> float:
         other = _turned(given, Rotation.from_rotvec(angle * up) * rotation)
         return float((_fitted(robot, other)[1] @ up).mean())
 
-    if not turn(-MOST_TURNED) > 0 > turn(MOST_TURNED):
-        return Rotation.identity()
-    return Rotation.from_rotvec(brentq(turn, -MOST_TURNED, MOST_TURNED, xtol=ACCURATE) * up)
+    first = turn(0.0)
+    second = turn(first)  # nearly linear in the heading
+    return Rotation.from_rotvec(first**2 / (first - second) * up if abs(second) < abs(first) else 0 * up)

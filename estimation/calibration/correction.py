@@ -53,7 +53,7 @@ def correction_of(robot: Robot, measurements: Measurements) -> Correction:
         if found is None:
             break
         if found.corrected is None:
-            raise InputError(f"measurements must have one probable error to be corrected, got several: {found.text}")
+            raise InputError(f"measurements must have one probable error that is known, got: {found.text}")
         texts.append(found.text)
         sizes = np.broadcast_to(found.factors, robot.m)
         counted |= not set(np.abs(sizes).tolist()) <= {1.0, *FACTORS}

@@ -97,8 +97,9 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     framed = carriers is None and bool((known.any(axis=0) | (robot.dof_mask == 0))[3:].all())
     angles = points.angles(rotation) if given.poses is None else np.where(known[:, 3:], given.poses[:, 3:], 0.0)
     if tracked(robot, given).sum() < 4:
-        attitudes = misread_attitudes(robot, given)
-        return Mistake(*attitudes) if attitudes else _too_large(robot, given, given.lengths * table[:, 7])
+        large = _too_large(robot, given, given.lengths * table[:, 7])
+        attitudes = None if large else misread_attitudes(robot, given)
+        return Mistake(*attitudes) if attitudes else large
     log, e = _samples(robot, given, table).sound()
     if not _is_noise(log, e):
         # The clock of the poses may be ahead, which another frame or convention does not explain.
@@ -341,13 +342,14 @@ def _too_large(robot: Robot, given: Measurements, readings: np.ndarray) -> Mista
     change = float(np.median(np.ptp(readings, axis=0)))
     if change <= LARGEST * length:
         return None
+    factor = next((one for one in FACTORS if one * change <= LARGEST * length), None)
+    unit = FACTORS[factor] if factor else "counts, whose size is not given"
     text = (
-        f"the lengths look like {FACTORS[1e-3]}: they change by {quantity(change, 'm', digits=3)}, and a cable of "
+        f"the lengths look like {unit}: they change by {quantity(change, 'm', digits=3)}, and a cable of "
         f"{robot.name} is about {quantity(length, 'm', digits=3)} long"
     )
-    position, rotation, _ = measured_poses(robot, given)
-    corrected = _corrected(given, position, rotation, given.carrier_poses, np.arange(robot.m), 1e-3)
-    return Mistake(text, corrected, factors=1e-3)
+    corrected = given.with_lengths(given.lengths * factor) if factor else None
+    return Mistake(text, corrected, factors=factor or 1.0)
 
 
 def _rms(sizes: np.ndarray) -> float:

@@ -9,9 +9,10 @@ from ...base.text import counted, quantity
 from ...figures.drawing import Drawing
 from ...figures.report import Part, Report, Section, Table
 from ...models.parsing import to_yaml
-from ..logs.encoders import locked
+from ..logs.load_cells import slack
 from .geometry import length_of
 from .result import CalibrationData, Parameter
+from .solving import is_still
 from .turning import turning
 
 MOST_LISTED = 12
@@ -108,10 +109,12 @@ def _of_noise(result: CalibrationData) -> list[str]:
         )
     if result.noise > LACKS * stated and "scales" not in result.free:
         lines.append("the model is incomplete: --free auto also tries scales, attachments and more")
-    if "anchors" in result.free and "offsets" not in result.free and locked(result.measurements.lengths):
+    kept = {"anchors", "offsets"} - set(result.free)
+    if len(kept) == 1 and is_still(result.measurements):
+        name = kept.pop()
         lines.append(
             "the lengths hardly change, so they do not distinguish offsets from anchors: the standard deviations below "
-            "hold only if the file's offsets are exact; with --free anchors,offsets --prior offsets=0.02 they include "
+            f"hold only if the file's {name} are exact; with --free anchors,offsets --prior {name}=0.02 they include "
             "errors of 20 mm"
         )
     turns = turning(result.file, result.measurements) if "attachments" in result.free else None
@@ -167,6 +170,10 @@ def _of_exceptions(result: CalibrationData) -> list[str]:
         f"{'longer' if slip.size > 0 else 'shorter'} than its reading (+- {_mm(slip.sigma)})"
         for slip in result.slips
     ]
+    loose = slack(result.file, result.measurements).sum(axis=0)
+    if loose.any():
+        named = ", ".join(f"cables[{i}] ({loose[i]})" for i in np.flatnonzero(loose))
+        lines.append(f"left out: readings of cables that hardly pull, which may be slack: {named}")
     wrong = sorted(result.outliers, key=lambda one: -abs(one.error))
     lines += [
         f"left out: {', '.join(f'cables[{i}]' for i in (one.cable, *one.others))} at sample {one.sample}, "

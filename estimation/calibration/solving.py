@@ -9,6 +9,7 @@ from ...base.errors import InputError
 from ...base.text import counted
 from ...models.robot import Robot
 from ..logs.cable_directions import placed
+from ..logs.load_cells import slack
 from ..logs.measurements import Measurements, measured_poses, tracked
 from ..logs.pose_track import PoseTrack
 from .autocorrelation import information_of
@@ -69,10 +70,12 @@ class Noise(NamedTuple):
 
 
 def usual(robot: Robot, measurements: Measurements) -> tuple[str, ...]:
-    """Return the default free parameters, with the clock offset if a motion was measured."""
+    """Return the default free parameters: offsets, anchors if the readings change, the clock if motion was measured."""
+    still = is_still(measurements)
+    if still and measurements.carrier_poses is None:
+        return ("offsets",)
     groups = ("anchors", "offsets", "clock")
-    moves = measurements.times is not None and not is_still(measurements)
-    known = moves and is_enough(robot, measurements, ("clock",))
+    known = measurements.times is not None and not still and is_enough(robot, measurements, ("clock",))
     return groups if known and moves_smoothly(robot, measurements) else groups[:-1]
 
 
@@ -95,7 +98,7 @@ def solve(
 ) -> Solved:
     """Fit, remove outliers and model slips, until there are no more; arguments are checked."""
     model = model_of(robot, measurements, groups, prior)
-    length = length_of(robot)
+    length, taut = length_of(robot), model.weights
     state = begin_with_clock(model, length) if "clock" in groups else model.begin()
     model = replace(model, ahead=float(state.x[model.parameters.clock]))
     result, used = fit_from(model, state, length, outliers)
@@ -110,13 +113,12 @@ def solve(
         found, left = find_outliers(model, result.state)
         # Where more than a few readings look wrong, something lasts: they are looked at only if it is no slip.
         many = len(found) > max(2, FEW * len(measurements))
-        sought = (many or not found) and len(slips) < MOST_SLIPS
+        sought = (many or not found) and len(slips) < MOST_SLIPS and robot.fixed_lengths is None
         candidates = find_slips(model, result.state, length) if sought else []
         if sought and many:  # robust fits may see readings of several cables as wrong where one has slipped
             candidates += find_slips(model, fit(model, result.state, length).state, length)
         if candidates:
-            every = replace(model, weights=np.ones_like(model.weights))
-            tried = [(one, *_with_slip(every, result, one, length)) for one in candidates]
+            tried = [(one, *_with_slip(replace(model, weights=taut), result, one, length)) for one in candidates]
             slip, longer, other, kept = min(tried, key=lambda one: _surprise(*one[2:]))
             large = abs(other.state.x[-1]) > LEAST_THRESHOLD * slip.sigma
             if large and _surprise(other, kept) < _surprise(result, fitted) - SHORTEST * LEAST_THRESHOLD**2:
@@ -234,8 +236,7 @@ def model_of(
     `track` is that of a model with the same poses, which needs as much memory as the log.
     """
     parameters = Parameters(robot, groups)
-    weights = np.ones((robot.m, len(measurements)), dtype=bool)
-    model = Model(parameters, measurements, prior, weights, forces=Balance(robot, measurements))
+    model = Model(parameters, measurements, prior, ~slack(robot, measurements).T, forces=Balance(robot, measurements))
     if "clock" in groups:
         if track is None:
             position, rotation, _ = measured_poses(robot, measurements)

@@ -1,14 +1,17 @@
-"""`unreadable`: tensions that a sensor cannot have measured, because it is dead or saturated."""
+"""`unreadable`: tensions of dead or saturated sensors; `slack`: cables that are longer than the way to the platform."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
 from ...base.text import quantity
+from ...models.robot import Robot
+from .measurements import Measurements, measured_poses
 
 FEWEST = 6  # equal samples that are not due to chance
 LEVELS, RARE = 3, 5.0  # values compared with the largest one, and how many times rarer they are if it is a saturation
 MOVES = 0.2  # of the usual change of the lengths from sample to sample, below which the platform rests
+NO_TENSION = 3.0  # standard deviations of the mean tension, below which a cable may be slack
 SAME = 1e-9  # of the largest tension, by which equal ones differ after interpolation
 
 
@@ -37,6 +40,18 @@ def unreadable(tensions: np.ndarray, lengths: np.ndarray) -> np.ndarray:
         if np.count_nonzero(top & moving) >= max(FEWEST, RARE * np.mean(counts)):
             result[:, saturated] = top
     return result
+
+
+def slack(robot: Robot, measurements: Measurements) -> np.ndarray:
+    """Return which cables seem slack by their tensions, (N, m) of bool; none if positions were measured, which show it.
+
+    Tensions that follow from thrusts are too uncertain.
+    """
+    tensions, known = measurements.tensions, measured_poses(robot, measurements)[2]
+    if tensions is None or known[:, :3].all() or any(carrier.actuators for carrier in robot.carriers):
+        return np.zeros(measurements.lengths.shape, dtype=bool)
+    least = NO_TENSION * measurements.sigma.tensions * np.abs(tensions).mean()
+    return (tensions < least) & ~unreadable(tensions, measurements.lengths)
 
 
 def notes(tensions: np.ndarray, lengths: np.ndarray) -> Iterator[str]:

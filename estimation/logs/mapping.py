@@ -120,11 +120,13 @@ def fields_of(
         parts = _below(recordings, given.pose)
         for name in ("position", "orientation"):
             found[name] = found[name] or _usual(parts, name, m, (), free=free)
+    named = {(id(one.topic), one.name) for of in found.values() for one in of}  # have one role
     everything = _everything(recordings)
     of_platform = _everything(recordings, [_prefix(given, name) for name in carriers])
     for name in roles:
         if not found.get(name) and not (given and given.pose and name in ("position", "orientation")):
             fields = of_platform if name in ("position", "orientation", "directions") else everything
+            fields = [one for one in fields if (id(one[1]), one[2]) not in named]
             found[name] = _usual(fields, name, m, found.get("position", ()), free=free)
     found["efforts"] = _usual(everything, "efforts", m, ())
     return Fields(**found, time=_times(recordings, given))
