@@ -25,10 +25,10 @@ def shrunk(name, size):
     return robot.model_copy(update={"cables": tuple(cables)})
 
 
-def a_log(robot, seed, turn, offsets=PRIOR["offsets"]):
+def a_log(robot, seed, turn, offsets=PRIOR["offsets"], anchors=PRIOR["anchors"]):
     """Return the robot as built, its offsets, poses and readings."""
     draw = np.random.default_rng(seed)
-    built = moved_anchors(robot, draw, PRIOR["anchors"])
+    built = moved_anchors(robot, draw, anchors)
     room = 0.25 * np.ptp(robot.home_anchors, axis=0)
     poses = robot.home + draw.uniform(-1, 1, (120, 6)) * [*room, turn, turn, turn] * robot.dof_mask
     own = draw.normal(0, offsets, robot.m)
@@ -67,6 +67,14 @@ def test_the_truth_is_inside_the_ellipsoid(name, size, turn):
         assert result.converged
         assert distance(result, built, offsets) < 1
         assert turned(result.poses, poses) < 8
+
+
+def test_anchors_out_of_the_plane_are_errors_of_offsets():
+    """They lengthen cables to second order only, here by several standard deviations of the offsets."""
+    robot, prior = load("planar-4"), {"anchors": 0.03, "offsets": 0.05}
+    for seed in range(8):
+        built, offsets, _, readings = a_log(robot, seed, 0.3, anchors=prior["anchors"])
+        assert distance(calibrate(robot, Measurements(readings), prior=prior), built, offsets) < 1
 
 
 def test_readings_that_count_from_home():
@@ -137,6 +145,10 @@ def test_a_wrong_reading_that_could_be_of_any_cable_tells_nothing(seed):
     wrong = (draw.random((120, 7)) < 0.01) * draw.choice([-1, 1], (120, 7)) * draw.uniform(0.05, 0.3, (120, 7))
     result = calibrate(robot, Measurements(readings + wrong[:60]), prior=PRIOR)
     assert distance(result, built, offsets) < 1
+    assert "CANNOT TELL" not in str(result.report())
+    wrong = (draw.random((60, 7)) < 0.1) * draw.choice([-1, 1], (60, 7)) * draw.uniform(0.05, 0.3, (60, 7))
+    other = calibrate(robot, Measurements(readings + wrong), prior=PRIOR)
+    assert "CANNOT TELL which readings are wrong" in str(other.report())
     lost = {one.sample for one in result.outliers if one.others}
     assert lost == set(np.flatnonzero(np.isnan(result.poses[:, 0])).tolist()) != set()
 

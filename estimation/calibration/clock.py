@@ -89,7 +89,5 @@ def _cost_at(model: Model, clock: float, length: float) -> float:
         return np.inf
     equations = NormalEquations.at(model, state, metric(model))
     of_poses = 0.0 if equations.y is None else float(np.vdot(equations.y, equations.y))
-    gained = 0.0
-    if equations.b.size:
-        gained = float(equations.b @ np.linalg.solve(held(equations.S, length), equations.b))
+    gained = float(equations.b @ np.linalg.solve(held(equations.S, length), equations.b))
     return (equations.cost - of_poses - gained) / max(inside, 1)

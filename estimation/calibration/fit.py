@@ -151,8 +151,6 @@ def _step(
     Poses that are already optimal for the parameters (`at_best`) contribute no decrease.
     """
     of_poses = 0.0 if equations.y is None or at_best else float(np.vdot(equations.y, equations.y))
-    if not equations.b.size:
-        return np.zeros(0), of_poses
     S, b = held(equations.S, length), equations.b
     if damped:
         dp = -np.linalg.solve(S, b)

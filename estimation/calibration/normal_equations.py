@@ -50,11 +50,8 @@ def metric(model: Model) -> np.ndarray:
     strong = measurements.tensions
     force = max(float(np.sqrt((strong**2).mean())) if strong is not None else model.robot.force_scale, 1e-9)
     length = length_of(model.robot)
-    table[:, 9], table[:, 10], table[:, 11:] = (
-        spread**2,
-        force * length,
-        (length, length / force, length, length / force),
-    )
+    table[:, 9], table[:, 10] = spread**2, force * length
+    table[:, 11:] = length, length / force, length, length / force
     of_robot = (speed, length / model.robot.platform.mass, 1.0, 1.0, 1.0)
     return np.concatenate([table.ravel(), of_robot, np.ones(len(parameters.slips))])
 

@@ -77,6 +77,8 @@ def observability(
 
 def _names(N: np.ndarray, parameters: Parameters, state: State, scale: np.ndarray) -> tuple[str, ...]:
     """Return a name for each column of N, (p, d), gauges first."""
+    from scipy.linalg import null_space
+
     names: list[str] = []
     rest = N
     varies = parameters.varies
@@ -94,14 +96,8 @@ def _names(N: np.ndarray, parameters: Parameters, state: State, scale: np.ndarra
             continue
         names.append(words)
         # The open directions that are left: those across this one.
-        rest = rest @ _across(left)
+        rest = rest @ null_space(left[None])
     return (*names, *_by_parameters(rest, parameters, state))
-
-
-def _across(vector: np.ndarray) -> np.ndarray:
-    """Return an orthonormal basis of the complement of a vector (d,), (d, d - 1)."""
-    basis: np.ndarray = np.linalg.qr(np.column_stack([vector, np.eye(len(vector))]))[0]
-    return basis[:, 1 : len(vector)]
 
 
 def _generators(parameters: Parameters, state: State) -> Iterator[tuple[str, np.ndarray]]:

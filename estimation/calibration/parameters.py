@@ -26,14 +26,7 @@ from ...models.robot import Robot
 OF_CABLE = 15  # parameters of a cable
 OF_ROBOT = 5  # clock offset, mass and CoM
 GEOMETRY = ("anchors", "attachments", "offsets", "scales", "radii", "build-up", "clock")
-IN_BALANCE = (
-    "mass",
-    "com",
-    "capstan",
-    "friction",
-    "gains",
-    "zeros",
-)  # groups that only the balance of forces determines
+IN_BALANCE = ("mass", "com", "capstan", "friction", "gains", "zeros")  # that only the balance of forces determines
 GROUPS = (*GEOMETRY, "stiffness", *IN_BALANCE)
 COLUMNS = {"anchors": (0, 1, 2), "attachments": (3, 4, 5), "offsets": (6,), "scales": (7,), "radii": (8,)}
 COLUMNS |= {"build-up": (9,), "stiffness": (10,), "capstan": (11,), "friction": (12,), "gains": (13,), "zeros": (14,)}

@@ -144,12 +144,8 @@ def _of_parameters(result: CalibrationData) -> list[Part]:
     if more := sum(one.name not in shown for one in result.parameters):
         lines.append(f"and {more} more, with no larger changes")
     if result.beyond_prior:
-        named = ", ".join(
-            f"{name} ({quantity(sigmas, digits=2)})" for name, sigmas in result.beyond_prior[:MOST_LISTED]
-        )
-        more = len(result.beyond_prior) - MOST_LISTED
-        others = f" and {more} more" if more > 0 else ""
-        lines.append(f"beyond 5 sigmas of the prior: {named}{others}; check the log, the file and the prior")
+        named = _first([f"{name} ({quantity(sigmas, digits=2)})" for name, sigmas in result.beyond_prior], MOST_LISTED)
+        lines.append(f"beyond 5 sigmas of the prior: {named}; check the log, the file and the prior")
     return lines
 
 
@@ -175,6 +171,12 @@ def _of_exceptions(result: CalibrationData) -> list[str]:
         named = ", ".join(f"cables[{i}] ({loose[i]})" for i in np.flatnonzero(loose))
         lines.append(f"left out: readings of cables that hardly pull, which may be slack: {named}")
     wrong = sorted(result.outliers, key=lambda one: -abs(one.error))
+    whole = len({one.sample for one in wrong if one.others})
+    if whole and result._noise.redundancy < len(result.parameters):
+        lines.append(
+            f"CANNOT TELL which readings are wrong: {whole} of {len(result.residuals)} samples are left out whole, and "
+            "the others hardly check each other: errors may be larger than stated, so add samples"
+        )
     lines += [
         f"left out: {', '.join(f'cables[{i}]' for i in (one.cable, *one.others))} at sample {one.sample}, "
         f"{f'because one of them is wrong; cables[{one.cable}] would be ' * bool(one.others)}off by {_mm(one.error)}"
@@ -185,14 +187,15 @@ def _of_exceptions(result: CalibrationData) -> list[str]:
     return lines
 
 
+def _first(names: list[str], most: int) -> str:
+    return ", ".join(names[:most]) + f" and {len(names) - most} more" * (len(names) > most)
+
+
 def _of_open(result: CalibrationData) -> list[Part]:
     texts, lines = result.not_identifiable, list[Part]()
     loose = [one.name for one in result.parameters if one.unit == "m" and LOOSE < one.sigma < np.inf]
     if loose:
-        names = ", ".join(loose[:MOST_NAMED]) + (
-            f" and {len(loose) - MOST_NAMED} more" if len(loose) > MOST_NAMED else ""
-        )
-        lines.append(f"poorly determined: {names}; measure other poses, or give a prior")
+        lines.append(f"poorly determined: {_first(loose, MOST_NAMED)}; measure other poses, or give a prior")
     if not texts:
         return [*lines, "all directions of the parameters are observable"]
     title = f"{counted(len(texts), 'unobservable direction')}, along which the file's values are kept:"

@@ -25,14 +25,13 @@ from .observability import Observability
 from .outliers import LEAST_THRESHOLD, SHORTEST, Outlier, Slip, find_outliers, find_slips, find_unbalanced, robust
 from .parameters import IN_BALANCE, Parameters
 from .pose_noise import keeping, observed
+from .projection import out_of_plane
 from .sightings import sighted
 from .starts import fit_from, level_poses
 
 WINDING = 10.0  # standard deviations of readings that change, and so show a clock offset
 LOOSE, LOOSE_SHARE = 0.1, 0.03  # [m] of standard deviation, and share of the cables' length: files are usually better
 NEARLY_LOOSE = 0.01  # of the variance, below which residuals are never large enough to make it so large
-EXCEEDS = 0.05  # by which residuals may exceed the stated sigma, beside chance
-
 ROUNDS = 30  # of fits, each without the wrong readings of those before
 FEW = 0.02  # of the samples
 MOST_SLIPS = 8
@@ -142,9 +141,8 @@ def solve(
 def _determined(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
     """Return the model that keeps the file's values where the log knows ends of cables and offsets worse, and its fit.
 
-    These are directions with a standard deviation beyond the limit along which the fit went farther than that.
-
-    A prior would hold them, so this is done without one.
+    These are directions with a standard deviation beyond the limit along which the fit went farther than that, without
+    a prior, which would hold them.
     """
     of = model.parameters
     lengths = np.flatnonzero(np.array(of.units)[of.varies] == "m")
@@ -313,10 +311,11 @@ def noise_of(solved: Solved) -> Noise:
         return Noise(np.nan, 1.0, redundancy, seen.covariance, seen.information)
     excess = float(np.sqrt(max(solved.fit.cost - float(((moved / sigmas) ** 2).sum()), 0.0) / redundancy))
     M, more = information_of(model, state, V * roots, np.eye(seen.rank) - D)
-    larger = excess**2 if excess > 1 + EXCEEDS else 1.0
+    larger = max(1.0, excess) ** 2
     shares, turn = np.linalg.eigh((V / roots).T @ seen.covariance @ (V / roots))
     wide = (turn * np.sqrt(np.maximum(shares, 0.0))) @ turn.T
-    spread = roots[:, None] * (wide @ (larger * M + D) @ wide) * roots
+    M = larger * M + D + out_of_plane(model, state, V * roots)
+    spread = roots[:, None] * (wide @ M @ wide) * roots
     return Noise(excess, more, redundancy, V @ spread @ V.T, V @ np.linalg.inv(spread) @ V.T)
 
 
@@ -336,9 +335,7 @@ def lengths_of(model: Model, state: State) -> np.ndarray:
 
 def inflation_of(noise: Noise) -> float:
     """Return the factor of a covariance without priors, for residuals larger than stated, or autocorrelated."""
-    if not np.isfinite(noise.excess):
-        return 1.0
-    return (noise.excess**2 if noise.excess > 1 + EXCEEDS else 1.0) * noise.autocorrelation
+    return max(1.0, noise.excess) ** 2 * noise.autocorrelation  # an excess that is nan leaves 1
 
 
 def covariance_of(solved: Solved, noise: Noise) -> np.ndarray:
