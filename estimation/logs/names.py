@@ -133,8 +133,9 @@ ANGLE_OF: dict[str, str] = dict(zip("xyz012", 2 * ("roll", "pitch", "yaw"), stri
 ANGLE_OF |= {"phi": "roll", "theta": "pitch", "psi": "yaw", "heading": "yaw"}
 
 
-# Names of PLCs begin with a type (fbAxis), those of Simulink count from 1 (Quat(4)), and some are German.
-_TYPE, _INDEX = re.compile(r"(?<![A-Za-z])(?:fb|st|lr|[afinr])(?=[A-Z][a-z])"), re.compile(r"(?<=[a-z])\((\d+)\)")
+# Names of PLCs begin with a type (fbAxis), vectors of Simulink count from 1 (Quat(4)), and some names are German.
+_TYPE = re.compile(r"(?<![A-Za-z])(?:fb|st|lr|[afinr])(?=[A-Z][a-z])")
+_INDEX = re.compile(r"(?<![a-z])(q|quat(?:ernion)?|p|pos(?:ition)?|xyz|rpy|euler|angles?)\((\d+)\)")
 _GERMAN = {"zeit": "time", "stempel": "stamp", "winde": "winch", "seil": "cable", "kraft": "force", "länge": "length"}
 
 
@@ -155,7 +156,7 @@ def role(name: str, stated: str = "") -> Role | None:
 
     `stated` is its unit, if there is one beside the name: `rx [deg]` is an angle, and `rx` is of a quaternion.
     """
-    low = _INDEX.sub(lambda found: f"[{int(found[1]) - 1}]", _TYPE.sub("", name).lower().lstrip(". "))
+    low = _INDEX.sub(lambda found: f"{found[1]}[{int(found[2]) - 1}]", _TYPE.sub("", name).lower().lstrip(". "))
     for word, english in _GERMAN.items():
         low = low.replace(word, english)
     texts = [(low, "")]
