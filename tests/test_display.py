@@ -19,7 +19,7 @@ from towline.models import pose_from_lengths
 from .robots_as_built import as_built
 
 ROOT = Path(__file__).parent.parent
-ROOMS = ("models", "solvers", "workspace", "calibration", "control", "simulation", "ocp", "viewer", "robust")
+ROOMS = ("models", "solvers", "workspace", "calibration", "control", "simulation", "ocp", "viewer")
 SVG = "{http://www.w3.org/2000/svg}"
 LIFT = {"name": "lift", "path": {"kind": "line", "start": [0, 0, 1], "end": [0.6, 0.4, 1.6]}, "duration": 3}
 
