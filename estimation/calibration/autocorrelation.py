@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+from scipy.fft import next_fast_len
 
 from .model import Model, State
 from .parameters import OF_CABLE
@@ -112,8 +113,9 @@ def _joined(held: list[list[_Kind]]) -> list[_Kind]:
 def _autocovariance(X: np.ndarray, lags: int) -> np.ndarray:
     """Return the sums of products of the rows of X (n, ...) with those l rows later, (lags,)."""
     n, columns = len(X), X.reshape(len(X), -1)
-    spectrum = (np.abs(np.fft.rfft(columns, 2 * n, axis=0)) ** 2).sum(axis=1)
-    return np.pad(np.fft.irfft(spectrum, 2 * n)[: min(lags, n)], (0, max(lags - n, 0)))
+    size = next_fast_len(n + min(lags, n), real=True)
+    spectrum = (np.abs(np.fft.rfft(columns, size, axis=0)) ** 2).sum(axis=1)
+    return np.pad(np.fft.irfft(spectrum, size)[: min(lags, n)], (0, max(lags - n, 0)))
 
 
 def _lagged(kind: _Kind, spread: np.ndarray, lags: int) -> np.ndarray:
@@ -138,8 +140,9 @@ def _added(kind: _Kind, r: np.ndarray) -> np.ndarray:
     """Return the sum of r(|l|) X_k'X_(k+l) over all samples of a kind and l other than 0, (r, r)."""
     X, n = kind.X, len(kind.X)
     r = r[1:n]
-    around = np.concatenate([[0.0], r, np.zeros(2 * n - 2 * len(r) - 1), r[::-1]])
-    X = np.fft.irfft(np.fft.rfft(X, 2 * n, axis=0) * np.fft.rfft(around).real[:, None, None], 2 * n, axis=0)[:n]
+    size = next_fast_len(n + len(r) + 1, real=True)
+    around = np.concatenate([[0.0], r, np.zeros(size - 2 * len(r) - 1), r[::-1]])
+    X = np.fft.irfft(np.fft.rfft(X, size, axis=0) * np.fft.rfft(around).real[:, None, None], size, axis=0)[:n]
     total = kind.X.reshape(-1, X.shape[2]).T @ X.reshape(-1, X.shape[2])
     return (total + total.T) / 2
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...models.robot import Robot
-from ..logs.alignment import coarse_offset
+from ..logs.alignment import coarse
 from ..logs.measurements import Measurements, measured_poses, tracked
 from ..logs.pose_track import PoseTrack
 from .fit import held
@@ -61,7 +61,8 @@ def moves_smoothly(robot: Robot, measurements: Measurements) -> bool:
     left = rows[1::2][track.inside(0.0)[rows[1::2]]]
     if not left.size:
         return False
-    apart, spread = track.at(0.0)[0][left] - position[left], position[left] - np.median(position[left], axis=0)
+    apart = track.at_samples(left).at(0.0)[0] - position[left]
+    spread = position[left] - np.median(position[left], axis=0)
     sizes = np.linalg.norm([apart, spread], axis=2)  # (2, n), whose medians hardly depend on a few wrong positions
     return bool(np.median(sizes[0]) < SMOOTH * np.median(sizes[1]))
 
@@ -77,7 +78,7 @@ def _by_cable_speeds(model: Model) -> float:
     # The residuals at the clock offset 0 are lengths less readings, up to their scales and offsets.
     readings = model.lengths(begin)
     lengths = readings + (model.residuals(begin).readings * given.sigma.lengths).T
-    return coarse_offset(given.times, readings, given.times[known], lengths[known])
+    return coarse(given.times, readings, given.times[known], lengths[known])[0]
 
 
 def _cost_at(model: Model, clock: float, length: float) -> float:

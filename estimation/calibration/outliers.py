@@ -32,6 +32,7 @@ MOST_CANDIDATES = 6
 WINDOW = 25  # samples on each side, over which a slip must be visible as a step
 VISIBLE = 0.5  # share of it that must be
 UNBALANCED = 1 - 1e-7  # share of sound samples whose forces are in better balance than those that are left out
+MOST_SAMPLES = 20_000  # of a robust fit with known poses
 SOFT = 4.0  # sigmas at which a reading has a quarter of its weight
 SOFTER = 4.0  # factor of the square of this limit from one step to the next
 STEPS, ENOUGH = 3, 1e-2  # of the fit at each limit, and share of the sum of squares of a step that it need not take
@@ -129,24 +130,42 @@ def robust(model: Model, state: State, length: float, rough: float = np.inf) -> 
     each minimum is near the one before (graduated non-convexity, Yang et al. 2020). Plain least squares would move
     unknown poses and parameters towards wrong readings, until sound ones look wrong.
 
+    Of a long log with known poses, some samples show the parameters that all readings are then compared with.
+
     - `rough`: first limit, in the final ones, if the state is good enough for it.
     """
-    passes: list[tuple[float, State, np.ndarray]] = []
+    count = len(model.measurements)
+    if model.poses_vary.any() or count <= MOST_SAMPLES:
+        return _robust(model, state, length, rough)[:2]
+    rows = np.linspace(0, count - 1, MOST_SAMPLES).astype(int)
+    part = model.only(rows)
+    begin = State(state.x, *(one[rows] for one in state[1:]))
+    found, _, least = _robust(part, fit(part, begin, length).state, length, rough)
+    at = state._replace(x=found.x)
+    sizes, limit = np.abs(model.residuals(at).readings), np.sqrt(least)
+    clean = sizes.max() <= limit / SOFT * _threshold(sizes.size)
+    return (state, model.weights) if clean else (at, model.weights & (sizes <= limit))
+
+
+def _robust(model: Model, state: State, length: float, rough: float) -> tuple[State, np.ndarray, float]:
+    """Return what `robust` does, and the square up to which readings fit."""
+    passes, exact = list[tuple[float, State, np.ndarray, float]](), not model.poses_vary.any()  # poses absorb no errors
     for follows in (False, True):  # the noise that residuals show, or the stated one
         begin, last = state, np.inf
         while True:
             found = project(model, begin)
             squares = found.residuals**2 / np.maximum(found.redundancy, SMALLEST_REDUNDANCY)
-            if squares.max() <= _threshold(squares.size) ** 2:
-                return begin, model.weights
-            least = (SOFT * (_noise(np.sqrt(squares[model.weights])) if follows else 1.0)) ** 2
+            noise = _noise(np.sqrt(squares[model.weights])) if follows or exact else 1.0
+            if squares.max() <= ((noise if exact else 1.0) * _threshold(squares.size)) ** 2:
+                return begin, model.weights, (SOFT * noise) ** 2
+            least = (SOFT * (noise if follows else 1.0)) ** 2
             limit = max(least, min(last / SOFTER, rough * SOFT**2, float(squares.max())))
             if limit > FALLS * last:
                 break
             soft = replace(model, weights=model.weights * (limit / (limit + squares)))
             begin, last = fit(soft, begin, length, STEPS, enough=ENOUGH).state, limit
         fits = model.weights & (squares <= least)
-        passes.append((_unlikeliness(model, found.residuals**2, squares, fits), begin, fits))
+        passes.append((_unlikeliness(model, found.residuals**2, squares, fits), begin, fits, least))
     return min(passes, key=lambda one: one[0])[1:]
 
 

@@ -24,7 +24,7 @@ from ...models import points
 from ...models.files import as_robot
 from ...models.robot import Robot
 from ..logs.clocks import LIKE, SURELY, realigned
-from ..logs.measurements import Measurements, changed, check_measurements, measured_poses, tracked
+from ..logs.measurements import Measurements, changed, check_measurements, measured, measured_poses, tracked
 from .attitudes import misread_attitudes
 from .differences import AS_GIVEN, FEWEST, PLAUSIBLE, LogPart, medians
 from .frames import Frames, displaced_frames, fitted_frames, in_convention
@@ -45,6 +45,7 @@ DISPLACED = 3.0  # times smaller differences, by a frame near the file's
 LAST_STEP = 3  # of fits of frames: to readings as they are, up to scales, and twice with these scales
 FAR = 3.0  # times the noise, of differences that are not explained yet
 OTHER_FACTOR, SAME_FACTOR = 0.1, 0.01  # from 1, and from those of units
+Placed = tuple[np.ndarray, np.ndarray, np.ndarray | None]  # positions, rotations, and poses of carriers
 
 
 class Mistake(NamedTuple):
@@ -92,20 +93,20 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     given = check_measurements(robot, measurements)
     parameters = Parameters(robot, ())
     table = parameters.table(parameters.first)
-    position, rotation, known = measured_poses(robot, given)
-    carriers = given.carrier_poses
+    carriers, known = given.carrier_poses, measured(given)
     framed = carriers is None and bool((known.any(axis=0) | (robot.dof_mask == 0))[3:].all())
-    angles = points.angles(rotation) if given.poses is None else np.where(known[:, 3:], given.poses[:, 3:], 0.0)
-    if tracked(robot, given).sum() < 4:
+    rows = np.flatnonzero(tracked(robot, given))
+    if len(rows) < 4:
         large = _too_large(robot, given, given.lengths * table[:, 7])
         attitudes = None if large else misread_attitudes(robot, given)
         return Mistake(*attitudes) if attitudes else large
-    log, e = _samples(robot, given, table).sound()
+    rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), MOST_SAMPLES)).astype(int)]
+    log, e = _part(robot, given.only(rows), table).sound()
     if not _is_noise(log, e):
         # The clock of the poses may be ahead, which another frame or convention does not explain.
-        moved, clock = realigned(robot, given)
+        moved, clock = realigned(robot, given, rows)
         if clock is not None and clock.likeness > LIKE and abs(clock.offset) > SURELY * clock.sigma:
-            log, e = _samples(robot, moved, table).sound()
+            log, e = _part(robot, moved, table).sound()
     order, e = np.arange(robot.m), e[:, : len(log.y)]
     noise = log.sigma * np.sqrt(1 + BY_CHANCE * np.sqrt(2 / e.size))
     if _is_noise(log, e):
@@ -116,7 +117,7 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     change = float(np.median(np.abs(log.y - np.median(log.y, axis=0))))
     named = best.weighted < as_given and best.size < EXPLAINED * change
     far = best.size * best.way.factor > FAR * noise if named else as_given > EXPLAINED * change
-    whole = log._replace(position=position, rotation=rotation, angles=angles, carriers=carriers)
+    whole = _part(robot, given, table) if named or far else log
     if far and framed and len(log.y) >= FEWEST[1]:
         part, read = log, AS_GIVEN
         for step in range(LAST_STEP + 1):
@@ -127,7 +128,7 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
                     frames, read = in_convention(part, frames)
             else:  # with scales that are known, the frames are found more exactly
                 frames = fitted_frames(part)
-            moved = frames.of(position, whole.at(read)[1])
+            moved = frames.of(whole.position, whole.at(read)[1])
             placed = frames.of(log.position, log.at(read)[1])
             there, left = log._replace(position=placed[0], rotation=placed[1]).sound()
             size = _rms(medians(left, len(there.y)))
@@ -141,7 +142,7 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
             elif way.weighted * way.way.factor < left_before and way.size < EXPLAINED * change:
                 text = _in_frame(frames._replace(size=way.size), as_given)
                 text = ", and ".join(filter(None, (way.text, read.text, text)))
-                return Mistake(text, _corrected(given, *moved, None, way.columns, factors), factors=factors)
+                return Mistake(text, _corrected(given, (*moved, None), way.columns, factors), factors=factors)
     if named:
         factors = best.signs * best.way.factor
         # Fitted scales reduce the differences of any log; the remainder may be due to a wrong explanation.
@@ -152,7 +153,7 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
         if open_:
             text = f"{text}; but something else explains them nearly as well: {rival.text}"
         several = best.several or open_
-        corrected = None if several else _corrected(given, *whole.at(best.way), best.columns, factors)
+        corrected = None if several else _corrected(given, whole.at(best.way), best.columns, factors)
         return Mistake(text, corrected, factors=factors)
     return None if far or not framed else _displaced(log, given, noise)
 
@@ -168,14 +169,8 @@ def _better(text: str, before: float, after: float) -> str:
     return f"{text}: correcting this makes the differences between lengths and poses {times} times smaller"
 
 
-def _corrected(
-    given: Measurements,
-    position: np.ndarray,
-    rotation: np.ndarray,
-    carriers: np.ndarray | None,
-    columns: np.ndarray,
-    factors: np.ndarray | float,
-) -> Measurements:
+def _corrected(given: Measurements, placed: Placed, columns: np.ndarray, factors: np.ndarray | float) -> Measurements:
+    position, rotation, carriers = placed
     poses = given.poses
     if poses is not None:
         poses = np.where(np.isfinite(poses), np.hstack([position, points.angles(rotation)]), np.nan)
@@ -198,28 +193,23 @@ def _displaced(log: LogPart, given: Measurements, noise: float) -> Mistake | Non
     frames, before = min(found[0], fitted_frames(log), key=lambda one: one.size), found[1]
     if robot.m <= MANY_CABLES and before < DISPLACED**2 * max(frames.size, noise):
         placed = frames.of(log.position, log.rotation)
-        sizes = [
-            _rms(medians(one.sound(0)[1], len(one.y)))
-            for one in (log, log._replace(position=placed[0], rotation=placed[1]))
-        ]
+        logs = log, log._replace(position=placed[0], rotation=placed[1])
+        sizes = [_rms(medians(one.sound(0)[1], len(one.y))) for one in logs]
         if sizes[0] < VERY_CLEARLY * sizes[1]:
             return None  # displaced ends of cables are as plausible
     position, rotation, _ = measured_poses(robot, given)
-    corrected = _corrected(given, *frames.of(position, rotation), None, np.arange(robot.m), 1.0)
+    corrected = _corrected(given, (*frames.of(position, rotation), None), np.arange(robot.m), 1.0)
     shift, turn = frames.inner
     moved = np.linalg.norm(robot.attachments @ (turn - np.eye(3)).T + shift, axis=1).max()
     return Mistake(_in_frame(frames, before), corrected, severe=bool(moved > PLAUSIBLE * length_of(robot)))
 
 
-def _samples(robot: Robot, given: Measurements, table: np.ndarray) -> LogPart:
-    """Return some samples of measurements, those with poses."""
-    rows = np.flatnonzero(tracked(robot, given))
-    rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), MOST_SAMPLES)).astype(int)]
-    part = given.only(rows)
+def _part(robot: Robot, part: Measurements, table: np.ndarray) -> LogPart:
+    """Return measurements as a part of a log."""
     position, rotation, known = measured_poses(robot, part)
     angles = points.angles(rotation) if part.poses is None else np.where(known[:, 3:], part.poses[:, 3:], 0.0)
     y = part.lengths * table[:, 7]
-    return LogPart(robot, table, position, rotation, angles, y, given.sigma.lengths, part.carrier_poses)
+    return LogPart(robot, table, position, rotation, angles, y, part.sigma.lengths, part.carrier_poses)
 
 
 def _is_noise(log: LogPart, e: np.ndarray) -> bool:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.text import quantity
+from .pose_track import on_spline, slopes_of_spline
 
 MOST_BINS = 65_536  # of the coarse search
 MOST_FITTED = 5000  # samples
@@ -53,9 +54,9 @@ def align(
 
     Raises `InputError` if the speeds have too little in common.
     """
-    found = [_coarse(times, readings, pose_times, lengths, _speeds)]
+    found = [coarse(times, readings, pose_times, lengths)]
     if found[0][2] < SURE:  # poses in another frame still show how fast the platform is
-        offset, _, likeness = _coarse(times, readings, pose_times, poses[:, :3], _whole_speed)
+        offset, _, likeness = coarse(times, readings, pose_times, poses[:, :3], _whole_speed)
         found.append((offset, np.arange(lengths.shape[1]), likeness))
     fitted = [
         (*_fine(times, readings[:, order], pose_times, lengths, poses, offset), likeness)
@@ -68,18 +69,14 @@ def align(
     return clock._replace(likeness=likeness)
 
 
-def coarse_offset(times: np.ndarray, readings: np.ndarray, pose_times: np.ndarray, lengths: np.ndarray) -> float:
-    """Return the offset of the clock of poses [s] with the best correlation of cable speeds, as `align` begins with."""
-    return _coarse(times, readings, pose_times, lengths, _speeds)[0]
-
-
-def _coarse(
-    times: np.ndarray, readings: np.ndarray, pose_times: np.ndarray, lengths: np.ndarray, signals: Signals
+def coarse(
+    times: np.ndarray, readings: np.ndarray, pose_times: np.ndarray, lengths: np.ndarray, signals: Signals | None = None
 ) -> tuple[float, np.ndarray, float]:
     """Return the offset [s], the column of the readings that each cable resembles, and the correlation.
 
     Speeds over longer times, which have less noise, are tried as well.
     """
+    signals = signals or _speeds
     finest = max(*(float(np.median(np.diff(one))) for one in (times, pose_times)), 0.0)
     found = [_correlated(times, readings, pose_times, lengths, signals, finest)]
     for coarser in COARSER:
@@ -165,19 +162,18 @@ def _fine(
 
     Scales, offsets and linear effects are eliminated.
     """
-    from scipy.interpolate import CubicSpline
-
     low, high = pose_times[0] - offset, pose_times[-1] - offset
     rows = np.flatnonzero((times >= low) & (times <= high))
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_FITTED)).astype(int))]
     t, y = times[rows], readings[rows].T
     middle, half = 0.5 * (t[0] + t[-1]), max(0.5 * float(np.ptp(t)), 1e-9)
-    curve = CubicSpline(pose_times, np.hstack([lengths, poses]))
+    curve = np.hstack([lengths, poses])
+    slopes_of_curve = slopes_of_spline(pose_times, curve)
     m, shift, drift, left = len(y), 0.0, 0.0, 1.0
     sigma = np.full(2, np.inf)
     for _ in range(STEPS):
         at = np.clip(offset + shift + t + drift * (t - middle), pose_times[0], pose_times[-1])
-        values, slopes = curve(at), curve(at, 1)
+        values, slopes = on_spline(pose_times, curve, slopes_of_curve, at)
         normal, right, rest, count = np.zeros((2, 2)), np.zeros(2), 0.0, 0
         sizes = np.empty(m)
         for i in range(m):

@@ -120,8 +120,10 @@ def aligned(
     return align(lengths.times[complete], lengths.values[complete], position.times[rows], along, effects)
 
 
-def realigned(robot: Robot, measurements: Measurements) -> tuple[Measurements, Clock | None]:
-    """Return measurements at the times of poses by the clock that their cable speeds show now, and this clock.
+def realigned(
+    robot: Robot, measurements: Measurements, rows: np.ndarray | slice = slice(None)
+) -> tuple[Measurements, Clock | None]:
+    """Return samples of measurements at the times of poses by the clock that all cable speeds show, and this clock.
 
     Cable speeds of poses in a wrong frame hardly show the rate of a clock. Nothing changes, and the clock is None,
     without times, with moving carriers, or if lengths and poses have too little in common.
@@ -135,10 +137,10 @@ def realigned(robot: Robot, measurements: Measurements) -> tuple[Measurements, C
     except InputError:
         return measurements, None
     position, rotation, _ = measured_poses(robot, measurements)
-    track = PoseTrack((times - clock.offset) / clock.rate, position, rotation, known).at_times(times)
+    track = PoseTrack((times - clock.offset) / clock.rate, position, rotation, known).at_times(times[rows])
     position, rotation = track.at(0.0)[:2]
-    moved = np.where(np.isfinite(poses), np.hstack([position, points.angles(rotation)]), np.nan)
-    return changed(measurements, poses=moved).only(track.inside(0.0)), clock
+    moved = np.where(np.isfinite(poses[rows]), np.hstack([position, points.angles(rotation)]), np.nan)
+    return changed(measurements.only(rows), poses=moved).only(track.inside(0.0)), clock
 
 
 class Seen(NamedTuple):

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 from ...models import points
 from .smoothing import NEIGHBOURS, PART, continuous, smooth, widest_parabola
 
-SHARED = 100  # samples of a part of a spline: the effect of one on another falls to a quarter from sample to sample
+SHORT = 5000  # samples of a part of a spline, whose coefficients need much memory
+SHARED = 100  # and those beside it: the effect of one on another falls to a quarter from sample to sample
 WIDEST = 5.0  # median times between measured poses; the motion inside a longer gap is not known
 
 
@@ -67,12 +68,14 @@ class PoseTrack:
         `clock` is the time by which the clock of the poses is ahead of that of the lengths [s].
         """
         if self._last is None or self._last[0] != clock:
-            self._last = clock, self._at(np.clip(self._times + clock, *self._span))
+            times = np.clip(self._times + clock, *self._span)
+            parts = [self._at(times[first : first + PART]) for first in range(0, max(len(times), 1), PART)]
+            self._last = clock, tuple(np.concatenate(of) for of in zip(*parts, strict=True))
         position, rotation, velocity, rate = self._last[1]
         return position, rotation, velocity, rate
 
     def _at(self, times: np.ndarray) -> tuple[np.ndarray, ...]:
-        values, slopes = self._curve(times)
+        values, slopes = on_spline(self._measured, self._values, self._slopes, times)
         q, dq = values[:, 3:], slopes[:, 3:]
         length = np.linalg.norm(q, axis=1, keepdims=True)
         q, dq = q / length, dq / length
@@ -80,17 +83,18 @@ class PoseTrack:
         rate = 2 * (w * dv - dw * v + np.cross(v, dv))  # the vector part of 2 dq q*, for rates in {G}
         return values[:, :3], Rotation.from_quat(q).as_matrix(), slopes[:, :3], rate
 
-    def _curve(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return positions and quaternions at times (N,) [s], and their derivatives, (N, 7)."""
-        before = np.clip(np.searchsorted(self._measured, times, side="right") - 1, 0, len(self._measured) - 2)
-        begin, step = self._measured[before], (self._measured[before + 1] - self._measured[before])[:, None]
-        u = (times - begin)[:, None] / step
-        first, last = self._values[before], self._values[before + 1]
-        begin_slope, end_slope = self._slopes[before], self._slopes[before + 1]
-        chord = (last - first) / step
-        square, cube = 3 * chord - 2 * begin_slope - end_slope, begin_slope + end_slope - 2 * chord
-        values = first + step * u * (begin_slope + u * (square + u * cube))
-        return values, begin_slope + u * (2 * square + 3 * u * cube)
+
+def on_spline(
+    times: np.ndarray, values: np.ndarray, slopes: np.ndarray, at: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return values and derivatives (k, d) at other times (k,) of the spline with those (n, d) at its times (n,)."""
+    before = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
+    begin, step = times[before], (times[before + 1] - times[before])[:, None]
+    u = (at - begin)[:, None] / step
+    first, begin_slope, end_slope = values[before], slopes[before], slopes[before + 1]
+    chord = (values[before + 1] - first) / step
+    square, cube = 3 * chord - 2 * begin_slope - end_slope, begin_slope + end_slope - 2 * chord
+    return first + step * u * (begin_slope + u * (square + u * cube)), begin_slope + u * (2 * square + 3 * u * cube)
 
 
 def slopes_of_spline(times: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -102,8 +106,8 @@ def slopes_of_spline(times: np.ndarray, values: np.ndarray) -> np.ndarray:
     from scipy.interpolate import CubicSpline
 
     count, result = len(times), np.empty(values.shape)
-    for first in range(0, count, PART):
-        last = min(first + PART, count)
+    for first in range(0, count, SHORT):
+        last = min(first + SHORT, count)
         begin, end = max(min(first, count - SHARED) - SHARED, 0), min(last + SHARED, count)
         curve = CubicSpline(times[begin:end], values[begin:end])
         result[first:last] = curve(times[first:last], 1)
