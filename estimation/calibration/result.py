@@ -23,7 +23,7 @@ from .parameters import OF_ROBOT
 from .plausibility import Mistake
 from .solving import Noise, Solved, covariance_of, inflation_of, is_still, lengths_of, noise_of
 
-EXACT = 0.02  # times the stated sigma: smaller errors are as good as none
+EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
 FAR = 5.0  # standard deviations of the prior
 FARTHEST = 0.5  # of the cables' length, by which an anchor or an attachment may be displaced
 

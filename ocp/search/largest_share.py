@@ -22,7 +22,7 @@ from .relaxations import ORDERS, at_ease, planned, rounded
 from .search import Search
 
 INSTANTS = 120  # at which tensions must exist before a motion is audited
-HALVINGS, OF_PROOFS = 10, 5  # the latter where a program decides what is offered
+HALVINGS, OF_PROOFS = 10, 6  # the latter where a program decides what is offered
 RESERVES = 1.0, 0.98, 0.9  # of the largest share with tensions at these instants, tried in order until an audit passes
 OF_PROGRAMS = 0.5, 0.9  # of it, if programs decide: in order until one has no solution
 LEAST = 0.1  # of it, if the first one has none
