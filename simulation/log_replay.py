@@ -330,7 +330,7 @@ def replay(
 def _fitted(matching: Matching, most: Explanation) -> tuple[Parameters, tuple[float, float]]:
     """Fit one parameter after the other, as long as that improves windows that are not fitted.
 
-    What explains most must have a place in the file, or else a wrong parameter would be written.
+    Nothing is fitted if the main cause has no place in the file, because a wrong parameter would be written.
     """
     number_of = np.arange(len(matching.kept))
     fits = number_of // (BLOCK if len(number_of) > BLOCK else 1) % 2 == 0

@@ -130,7 +130,7 @@ def robust(model: Model, state: State, length: float, rough: float = np.inf) -> 
     each minimum is near the one before (graduated non-convexity, Yang et al. 2020). Plain least squares would move
     unknown poses and parameters towards wrong readings, until sound ones look wrong.
 
-    Of a long log with known poses, some samples show the parameters that all readings are then compared with.
+    In a long log with known poses, the parameters are fitted to some samples, and all readings compared with them.
 
     - `rough`: first limit, in the final ones, if the state is good enough for it.
     """
@@ -160,7 +160,7 @@ def _robust(model: Model, state: State, length: float, rough: float) -> tuple[St
                 return begin, model.weights, (SOFT * noise) ** 2
             least = (SOFT * (noise if follows else 1.0)) ** 2
             limit = max(least, min(last / SOFTER, rough * SOFT**2, float(squares.max())))
-            if limit > FALLS * last:
+            if not limit < FALLS * last:  # also if residuals are infinite or undefined
                 break
             soft = replace(model, weights=model.weights * (limit / (limit + squares)))
             begin, last = fit(soft, begin, length, STEPS, enough=ENOUGH).state, limit

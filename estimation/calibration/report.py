@@ -188,6 +188,7 @@ def _of_exceptions(result: CalibrationData) -> list[str]:
 
 
 def _first(names: list[str], most: int) -> str:
+    """Return the first names in one text, and how many more there are."""
     return ", ".join(names[:most]) + f" and {len(names) - most} more" * (len(names) > most)
 
 

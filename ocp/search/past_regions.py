@@ -99,7 +99,7 @@ def _ways_round(
 ) -> Iterator[tuple[str, np.ndarray, np.ndarray, Scenario]]:
     """Yield how, through which places (n, 3), of which some are new (n,), and in which scenario a path leads past.
 
-    What is in the way is between `points` (k, 6) of the path. There are ever more places.
+    Obstacles are between `points` (k, 6) of the path. Each way has more places than the one before.
     """
     shares = np.linspace(0.0, 1.0, LOOKS)
     passed, blocked = _passed(scenario, points), exceeds(scenario, shares * scenario.duration, rates=False)
