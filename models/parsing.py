@@ -119,7 +119,7 @@ def validate(data: dict[str, Any], model: type[Model], where: str, folder: Path 
 
 
 def one_line(error: ValidationError, where: str, model: type[BaseModel]) -> str:
-    """Return one line for a failed check: where, field, what is accepted, the value, and how many others follow.
+    """Return one line for a failed check: where, field, what is accepted, the value, and which others are wrong.
 
     A key that is not known comes before a missing one: it usually is the missing one, misspelt.
     """
@@ -128,9 +128,13 @@ def one_line(error: ValidationError, where: str, model: type[BaseModel]) -> str:
     details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
     # A list whose items are wrong is counted by pydantic once more as too short.
     others = [other for other in details[1:] if other["type"] != "too_short"]
-    more = f"; {counted(len(others), 'more error')}" if others else ""
     line = printable(_sentence(details[0], model))
-    return (f"{where}: {line}" if where else line) + more
+    if others:
+        named = dict.fromkeys(_walk(other["loc"], json_schema(model))[0] for other in others[:3])
+        named = [printable(name, LONGEST_TEXT // 4) for name in named]
+        more = len(others) - len(others[:3])
+        line += f"; also wrong: {', '.join(named)}" + (f" and {more} more" if more else "")
+    return f"{where}: {line}" if where else line
 
 
 def _sentence(detail: Any, model: type[BaseModel]) -> str:

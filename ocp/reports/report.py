@@ -98,8 +98,8 @@ def cables_table(plan: PlanData) -> Table | None:
     every += [np.array([f(tensions[:, k]) if known[k] else np.nan for k in range(m)]) for f in (np.nanmin, np.nanmax)]
     written = zip(*(column(values.tolist()) for values in every), strict=True)
     rows = [(str(k + 1), *row) for k, row in enumerate(written)]
-    lengths_are = ("first length [m]", "last [m]", "shortest [m]", "longest [m]", "top speed [m/s]")
-    return Table("Cables", ("cable", *lengths_are, "tension from [N]", "to [N]"), rows, range(8))
+    lengths_are = ("initial length [m]", "final [m]", "shortest [m]", "longest [m]", "top speed [m/s]")
+    return Table("Cables", ("cable", *lengths_are, "smallest tension [N]", "largest [N]"), rows, range(8))
 
 
 def phases_table(plan: PlanData) -> Table | None:
