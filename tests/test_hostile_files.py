@@ -94,7 +94,9 @@ def test_a_file_of_plain_hdf5_makes_no_noise(saved, tmp_path):
 
 def test_many_wrong_items_take_time_in_proportion():
     """Each copied the list of those that followed it."""
-    with pytest.raises(InputError, match=r"^lengths: max\[0\] must be a number, got 'x'; also wrong: max\[1\], max\[2\], max\[3\] and 4996 more$"):
+    with pytest.raises(
+        InputError, match=r"^lengths: max\[0\] must be a number.*; also wrong: max\[1\], .* and 4996 more$"
+    ):
         Lengths(min=0.1, max=["x"] * 5000)
 
     def took(count: int) -> float:

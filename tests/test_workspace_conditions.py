@@ -482,7 +482,7 @@ def test_conditions_that_do_not_apply_to_a_robot():
 @pytest.mark.parametrize(
     ("wrong", "line"),
     [
-        ([["a"] * 6] * 500_000, r"accelerations\[0\]\[0\] must be a number, got 'a'; also wrong: accelerations\[0\]\[1\], .* and 2 more"),
+        ([["a"] * 6] * 500_000, r"\[0\]\[0\] must be a number.*; also wrong: accelerations\[0\]\[1\], .* and 2 more"),
         (["x"] * 500_000, r"accelerations\[0\] must be a list of 6 numbers, got 'x'"),
         (np.broadcast_to(0.0, (10**8, 6)), r"accelerations must be a list of at most 100000 items, got an array of"),
     ],
