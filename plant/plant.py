@@ -9,14 +9,14 @@ import numpy as np
 from ..base import processors
 from ..base.errors import InputError, SolverError
 from ..base.inputs import leading, number, one_of, repeated, shown, whole_number
-from ..core import run_plant, sense
+from ..core import run_plant
 from ..models.batch import as_array
 from ..models.dynamics import dynamics_of
 from ..models.files import AnyRobot, as_robot
 from ..models.record import FREE, IMPOSED, RESTS, record_of
 from . import layout
 from .packing import SETTINGS, command_rows, complete, given_or, leading_of, place
-from .reading import Reading
+from .reading import Reading, sensed
 
 DRIVES = {"lengths": layout.LENGTHS, "rates": layout.RATES, "forces": layout.FORCES, "tensions": layout.TENSIONS}
 SHORTEST_STEP, LONGEST_STEP = 1e-12, 1e3  # [s]
@@ -175,11 +175,9 @@ class Plant:
         cables[..., layout.LENGTH, :] = cables[..., layout.REFERENCE, :] = first
         states = np.concatenate([bodies.reshape(*batch, -1), cables.reshape(*batch, -1)], axis=-1)
         if tensions is not None and self.drive == "forces":
-            rows, rates = states.reshape(-1, self.size), self._places + layout.LENGTH_RATE * robot.m
-            lengths = np.empty((len(rows), 2, robot.m))
-            sense(self.record, rows, np.empty((len(rows), 1 + count, 12)), lengths)
-            unstrained = rows[:, self._places : self._places + robot.m]
-            rows[:, rates : rates + robot.m] = lengths[:, 1] * unstrained / lengths[:, 0]
+            along = sensed(robot, states)[1]
+            rates = self._places + layout.LENGTH_RATE * robot.m
+            states[..., rates : rates + robot.m] = along[..., 1, :] * first / along[..., 0, :]
         return states
 
     def fixed_lengths(self, tensions: np.ndarray) -> np.ndarray | None:

@@ -4,66 +4,23 @@ from functools import cached_property
 
 import numpy as np
 
+from ..core import sense
 from ..models import points
+from ..models.record import record_of
 from ..models.robot import Robot
 from . import layout
 
 
-def _rotation_of_products() -> np.ndarray:
-    """Return the map from products of two entries of a unit quaternion (w, x, y, z) to the entries of R, (16, 9)."""
-    of = np.zeros((4, 4, 3, 3))
-    of[0, 0] = np.eye(3)
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        of[1 + i, 1 + i, [0, 1, 2], [0, 1, 2]] = -1.0
-        of[1 + i, 1 + i, i, i] = 1.0
-        of[1 + i, 1 + j, [i, j], [j, i]] = 2.0
-        of[0, 1 + i, k, j], of[0, 1 + i, j, k] = 2.0, -2.0
-    return of.reshape(16, 9)
+def sensed(robot: Robot, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return what perfect sensors measure of states (..., n).
 
-
-_ROTATION = _rotation_of_products()
-
-
-class _Bodies:
-    """The motion of bodies, (..., 13) in a state, with the position of their CoM in their frame, (3,)."""
-
-    def __init__(self, blocks: np.ndarray, com: np.ndarray):
-        self._blocks, self._com = blocks, com
-
-    @property
-    def rate(self) -> np.ndarray:
-        return self._blocks[..., layout.RATE :]
-
-    @cached_property
-    def rotation(self) -> np.ndarray:
-        q = self._blocks[..., layout.QUATERNION : layout.VELOCITY]
-        products = (q[..., :, None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
-        return (products @ _ROTATION).reshape(*q.shape[:-1], 3, 3)
-
-    @cached_property
-    def pose(self) -> np.ndarray:
-        R, pose = self.rotation, np.empty((*self._blocks.shape[:-1], 6))
-        pose[..., :3] = self._blocks[..., :3]
-        if self._com.any():
-            pose[..., :3] -= R @ self._com
-        pose[..., 3:] = points.angles(R)
-        return pose
-
-    @cached_property
-    def velocity(self) -> np.ndarray:
-        R, velocity = self.rotation, np.empty((*self._blocks.shape[:-1], 6))
-        velocity[..., :3] = self._blocks[..., layout.VELOCITY : layout.RATE]
-        if self._com.any():
-            velocity[..., :3] -= np.einsum("...ij,...j->...i", R, np.cross(self.rate, self._com))
-        sine, cosine = -R[..., 2, 0], np.hypot(R[..., 2, 1], R[..., 2, 2])  # of the pitch
-        p, q, r = self.rate[..., 0], self.rate[..., 1], self.rate[..., 2]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            roll_sine, roll_cosine = R[..., 2, 1] / cosine, R[..., 2, 2] / cosine
-            velocity[..., 5] = (roll_sine * q + roll_cosine * r) / cosine
-            velocity[..., 3] = p + velocity[..., 5] * sine
-            velocity[..., 4] = roll_cosine * q - roll_sine * r
-        return velocity
+    The motions (..., 1 + c, 12) are poses and their time derivatives of platform and carriers, as `Reading` has them,
+    and the lengths (..., 2, m) distances along the cables and their rates [m, m/s].
+    """
+    rows, batch = np.ascontiguousarray(states.reshape(-1, states.shape[-1])), states.shape[:-1]
+    motions, lengths = np.empty((len(rows), 1 + len(robot.carriers), 12)), np.empty((len(rows), 2, robot.m))
+    sense(record_of(robot), rows, motions, lengths)
+    return motions.reshape(*batch, *motions.shape[1:]), lengths.reshape(*batch, *lengths.shape[1:])
 
 
 class Reading:
@@ -76,22 +33,18 @@ class Reading:
 
     def __init__(self, robot: Robot, states: np.ndarray):
         self._robot, self._states = robot, states
-        self._count = 1 + len(robot.carriers)
-
-    def _of(self, first: int, count: int) -> np.ndarray:
-        blocks = self._states[..., layout.BODY * first : layout.BODY * (first + count)]
-        return blocks.reshape(*self._states.shape[:-1], count, layout.BODY)
 
     @cached_property
-    def _platform(self) -> _Bodies:
-        return _Bodies(self._of(0, 1)[..., 0, :], np.array(self._robot.platform.com))
+    def _motions(self) -> np.ndarray:
+        return sensed(self._robot, self._states)[0]
 
-    @cached_property
-    def _carriers(self) -> _Bodies:
-        return _Bodies(self._of(1, self._count - 1), np.zeros(3))
+    @property
+    def _rates(self) -> np.ndarray:
+        bodies = self._states[..., : layout.BODY * (1 + len(self._robot.carriers))]
+        return bodies.reshape(*bodies.shape[:-1], -1, layout.BODY)[..., layout.RATE :]
 
     def _cable_block(self, block: int) -> np.ndarray:
-        m, places = self._robot.m, layout.BODY * self._count
+        m, places = self._robot.m, layout.BODY * (1 + len(self._robot.carriers))
         return self._states[..., places + block * m : places + (block + 1) * m]
 
     @property
@@ -102,42 +55,42 @@ class Reading:
     @property
     def pose(self) -> np.ndarray:
         """Return the pose of the platform frame in {G}, (..., 6) [m, rad]."""
-        return self._platform.pose
+        return self._motions[..., 0, :6]
 
     @property
     def velocity(self) -> np.ndarray:
         """Return the time derivative of `pose`, (..., 6) [m/s, rad/s]; undefined for angles at 90 degrees of pitch."""
-        return self._platform.velocity
+        return self._motions[..., 0, 6:]
 
     @property
     def rotation(self) -> np.ndarray:
         """Return the rotation matrix of the platform, (..., 3, 3) [-]."""
-        return self._platform.rotation
+        return points.rotations(self.pose[..., 3:])
 
     @property
     def rate(self) -> np.ndarray:
         """Return the angular velocity of the platform in its own axes, (..., 3) [rad/s]."""
-        return self._platform.rate
+        return self._rates[..., 0, :]
 
     @property
     def carrier_pose(self) -> np.ndarray:
         """Return the poses of the carriers in {G}, (..., c, 6) [m, rad]."""
-        return self._carriers.pose
+        return self._motions[..., 1:, :6]
 
     @property
     def carrier_velocity(self) -> np.ndarray:
         """Return the time derivatives of `carrier_pose`, (..., c, 6) [m/s, rad/s]."""
-        return self._carriers.velocity
+        return self._motions[..., 1:, 6:]
 
     @property
     def carrier_rotation(self) -> np.ndarray:
         """Return the rotation matrices of the carriers, (..., c, 3, 3) [-]."""
-        return self._carriers.rotation
+        return points.rotations(self.carrier_pose[..., 3:])
 
     @property
     def carrier_rate(self) -> np.ndarray:
         """Return the angular velocities of the carriers in their own axes, (..., c, 3) [rad/s]."""
-        return self._carriers.rate
+        return self._rates[..., 1:, :]
 
     @property
     def lengths(self) -> np.ndarray:

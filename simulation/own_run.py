@@ -11,9 +11,9 @@ from ..control.deviation import tolerance_of
 from ..control.noise import Noise
 from ..control.planned_references import references_at
 from ..control.trajectory import read_trajectory
-from ..core import sense
 from ..plant import Plant
 from ..plant.plant import History
+from ..plant.reading import sensed
 from .events import Cut
 from .experiment import Experiment
 from .record import Record
@@ -45,9 +45,9 @@ def simulation_of(plant: Plant, history: History, reference: Any = None, toleran
     if np.abs(steps - period).max() > SAME * period:
         raise InputError("history must have equally spaced times, got others")
     count, error = len(states), tolerance_of(robot, tolerance)
-    record, lengths = Record(robot, count), np.zeros((count, 2, robot.m))
-    sense(plant.record, np.ascontiguousarray(states), record.motions, lengths)
-    record.lengths[:], record.tensions[:], record.answered[:] = lengths[:, 0], history.tensions, UNCONTROLLED
+    record, (motions, lengths) = Record(robot, count), sensed(robot, states)
+    record.motions[:], record.lengths[:] = motions, lengths[:, 0]
+    record.tensions[:], record.answered[:] = history.tensions, UNCONTROLLED
     doubt, keep_out = "", ()
     if reference is None:
         poses, velocities = record.motions[..., :6], record.motions[..., 6:]

@@ -10,7 +10,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..base.errors import InputError
-from ..core import sense
 from ..estimation.logs.pose_track import PoseTrack, track_of
 from ..estimation.logs.recorded import Recorded
 from ..estimation.logs.recording import GAP
@@ -19,6 +18,7 @@ from ..models import points
 from ..models.dynamics import dynamics_of
 from ..plant import Plant, layout
 from ..plant.periods import Periods
+from ..plant.reading import sensed
 from ..plant.steps import steps_in
 from .replayed_robot import Parameters, changed, friction_of, lags_of, modelled
 
@@ -279,9 +279,7 @@ class Windows:
         pose, velocity, carrier_pose, carrier_velocity = parts
         given: dict[str, Any] = {"lengths": np.ones(m)} if free else {"tensions": pulls}
         states = plant.start(pose, velocity, carrier_pose, carrier_velocity, **given).reshape(-1, plant.size)
-        states = np.ascontiguousarray(states)
-        lengths = np.zeros((len(states), 2, m))
-        sense(plant.record, states, np.zeros((len(states), 1 + len(self.robot.carriers), 12)), lengths)
+        lengths = sensed(plant.robot, states)[1]
         stretch = 1 + np.tile(pulls, (len(shift), 1)) / plant.record["cable"]["stiffness"][:m]
         blocks = states[:, -layout.CABLE_BLOCKS * m :].reshape(len(states), -1, m)
         if free:
@@ -384,11 +382,7 @@ class Windows:
 
 def _seen(plant: Plant, states: np.ndarray, tensions: np.ndarray) -> np.ndarray:
     """Return position, quaternion (x, y, z, w), tensions and lengths of states (V, n, size), (V, n, 7 + 2 m)."""
-    flat = np.ascontiguousarray(states.reshape(-1, states.shape[-1]))
-    motions = np.zeros((len(flat), 1 + len(plant.robot.carriers), 12))
-    lengths = np.zeros((len(flat), 2, plant.robot.m))
-    sense(plant.record, flat, motions, lengths)
-    q = flat[:, layout.QUATERNION : layout.VELOCITY]
-    quaternion = np.where(np.isfinite(q).all(axis=1, keepdims=True), q, 1.0)[:, [1, 2, 3, 0]]
-    seen = np.hstack([motions[:, 0, :3], quaternion, tensions.reshape(len(flat), -1), lengths[:, 0]])
-    return seen.reshape(*states.shape[:2], -1)
+    motions, lengths = sensed(plant.robot, states)
+    q = states[..., layout.QUATERNION : layout.VELOCITY]
+    quaternion = np.where(np.isfinite(q).all(axis=-1, keepdims=True), q, 1.0)[..., [1, 2, 3, 0]]
+    return np.concatenate([motions[..., 0, :3], quaternion, tensions, lengths[..., 0, :]], axis=-1)

@@ -7,10 +7,10 @@ import numpy as np
 from ...control.computed_torque import ComputedTorque
 from ...control.fallback import CARRIED
 from ...control.state import Reference, State
-from ...core import sense
 from ...models.record import record_of
 from ...models.robot import Robot
 from ...plant import Plant
+from ...plant.reading import sensed
 from ...plant.steps import ANGLE, fastest_motion, winding_time
 
 PERIOD = 1e-3  # [s], of `simulate`
@@ -44,11 +44,10 @@ def data_at(robot: Robot, plant: Plant, reference: Reference) -> dict[str, Any]:
     motion = (reference.pose, reference.velocity, reference.carrier_pose, reference.carrier_velocity)
     fixed, fastest = plant.fixed_lengths(pulls), max(fastest_motion(plant))
     state = plant.start(*motion, tensions=pulls if fixed is None else None, lengths=fixed)
-    motions, lengths = np.zeros((1, 1 + len(robot.carriers), 12)), np.zeros((1, 2, robot.m))
-    sense(plant.record, state[None], motions, lengths)
+    motions, lengths = sensed(robot, state)
     carriers = np.stack(reference[3:6], axis=1)  # (c, 3, 6)
     given = np.vstack([np.concatenate(motion[:2]), np.concatenate(motion[2:], axis=1)])
-    measured = np.where(np.isnan(motions[0]), given, motions[0])  # at a pitch of 90 degrees
+    measured = np.where(np.isnan(motions), given, motions)  # at a pitch of 90 degrees
     controller = _Exported(robot)
     command = controller.step(0.0, State(*motion, pulls), reference)
     controller.reset()
