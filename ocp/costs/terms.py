@@ -1,7 +1,6 @@
 """The costs in the `objective` of a task file."""
 
 import casadi as ca
-from typing_extensions import override
 
 from ...models.rotation import rotation
 from .cost import Cost, CostState, RateCost
@@ -12,7 +11,6 @@ class Tension(Cost):
 
     name, unit = "tension", "N"
 
-    @override
     def values(self, state: CostState) -> ca.SX:
         return state.tensions
 
@@ -22,7 +20,6 @@ class TensionRate(RateCost):
 
     name, unit = "tension_rate", "N/s"
 
-    @override
     def values(self, state: CostState) -> ca.SX:
         return state.tensions
 
@@ -32,7 +29,6 @@ class PathDeviation(Cost):
 
     name, unit = "deviation", "m"
 
-    @override
     def values(self, state: CostState) -> ca.SX:
         return ca.vertcat(state.off_path[:3], state.robot.length * state.off_path[3:])
 
@@ -42,7 +38,6 @@ class CarrierOffset(Cost):
 
     name, unit = "carrier_offset", "m, rad"
 
-    @override
     def values(self, state: CostState) -> ca.SX:
         return ca.vertcat(*(offset.pose for offset in state.offsets[1:]))
 
@@ -55,7 +50,6 @@ class Formation(Cost):
 
     name, unit = "formation", "m"
 
-    @override
     def values(self, state: CostState) -> ca.SX:
         robot, platform = state.robot, state.platform.pose
         turned = rotation(ca.vertcat(0, 0, platform[5] - robot.home[5]))
@@ -69,7 +63,6 @@ class CarrierAcceleration(Cost):
 
     name, unit = "carrier_acceleration", "m/s^2, rad/s^2"
 
-    @override
     def values(self, state: CostState) -> ca.SX:
         return ca.vertcat(*(offset.acceleration for offset in state.offsets[1:]))
 
@@ -79,7 +72,6 @@ class Jerk(RateCost):
 
     name, unit = "jerk", "m/s^3, rad/s^3"
 
-    @override
     def values(self, state: CostState) -> ca.SX:
         return ca.vertcat(*(offset.acceleration for offset in state.offsets))
 
@@ -89,7 +81,6 @@ class Time(Cost):
 
     name, unit, squared = "time", "s", False
 
-    @override
     def values(self, state: CostState) -> ca.SX:
         return state.duration
 
@@ -99,6 +90,5 @@ class Margin(Cost):
 
     name, unit, squared = "margin", "N", False
 
-    @override
     def values(self, state: CostState) -> ca.SX:
         return -state.margin

@@ -18,7 +18,6 @@ class PlatformSpeed(Magnitude):
 
     name, unit = "platform_speed", "m/s"
 
-    @override
     def values(self, state: State) -> ca.SX:
         return state.platform.velocity[:3]
 
@@ -41,7 +40,6 @@ class ZoneSpeed(Magnitude):
         outside = np.linalg.norm(positions - self._centre, axis=1) - self._radius
         return self.high + STEEPNESS * np.maximum(outside, 0.0)
 
-    @override
     def values(self, state: State) -> ca.SX:
         from_centre = ca.sumsqr(state.platform.position - ca.DM(self._centre)) / self._radius**2
         # At least one under the root, which has no derivative at zero.
@@ -54,7 +52,6 @@ class PlatformAcceleration(Magnitude):
 
     name, unit = "platform_acceleration", "m/s^2"
 
-    @override
     def values(self, state: State) -> ca.SX:
         return state.platform.acceleration[:3]
 
@@ -64,7 +61,6 @@ class PlatformLateralAcceleration(Magnitude):
 
     name, unit = "platform_lateral_acceleration", "m/s^2"
 
-    @override
     def values(self, state: State) -> ca.SX:
         felt = state.platform.acceleration[:3] - ca.DM(state.robot.gravity)
         return (rotation(state.platform.pose[3:6]).T @ felt)[:2]
@@ -75,7 +71,6 @@ class PlatformTurn(Magnitude):
 
     name, unit = "platform_turn", "rad/s"
 
-    @override
     def values(self, state: State) -> ca.SX:
         return body_rate(state.platform.pose[3:6], state.platform.velocity[3:6])
 
@@ -85,7 +80,6 @@ class PlatformTilt(Angle):
 
     name = "platform_tilt"
 
-    @override
     def values(self, state: State) -> ca.SX:
         return state.platform.upright
 
@@ -99,7 +93,6 @@ class PlatformBox(Limit):
         self._axis, self.low, self.high = axis, low, high
         self.labels = (f"platform along {'xyz'[axis]}",)
 
-    @override
     def values(self, state: State) -> ca.SX:
         return state.platform.pose[self._axis]
 
@@ -114,7 +107,6 @@ class TubePosition(Magnitude):
         super().__init__(radius)
         self.shown = radius > 0
 
-    @override
     def values(self, state: State) -> ca.SX:
         return state.off_path[:3]
 
@@ -136,7 +128,6 @@ class TubeAttitude(Limit):
         self.hull = Hull(None, 0, (3 + axis,), at_ends=False)
         self.shown = turn > 0
 
-    @override
     def values(self, state: State) -> ca.SX:
         return state.off_path[3 + self._axis]
 
