@@ -76,11 +76,12 @@ def test_a_jump_over_a_place_between_two_points_is_noticed():
     shares = np.array([0.0, 0.4, 0.6, 1.0])  # the ball is halfway
     guess = initial_guess(scenario, np.linspace(0.0, 1.0, 41) * scenario.duration)
     nothing = np.array([[not is_local(scenario.limits.all[index])] * 4 for index, _ in parts(scenario.limits)])
-    assert not Near(nothing).suffices(scenario, shares, guess)
-    assert Near(nothing | (shares == 0.4)).suffices(scenario, shares, guess)  # that interval has rows
-    assert Near(nothing[:, :2]).suffices(scenario, shares[:2] / 2, guess)
+    holds = np.ones_like(nothing)
+    assert not Near(nothing, holds).suffices(scenario, shares, guess)
+    assert Near(nothing | (shares == 0.4), holds).suffices(scenario, shares, guess)  # that interval has rows
+    assert Near(nothing[:, :2], holds[:, :2]).suffices(scenario, shares[:2] / 2, guess)
     # However few are near, those where it may be exceeded are added: the same program would have the same solution.
-    widened = Near(nothing).widened(scenario, shares, guess, reach=-np.inf)
+    widened = Near(nothing, holds).widened(scenario, shares, guess, reach=-np.inf)
     assert widened.suffices(scenario, shares, guess)
     assert not widened.is_everywhere
 

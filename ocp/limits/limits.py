@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple, TypeAlias
@@ -25,8 +25,7 @@ Motion: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]  # pose, velocity,
 class Separating(NamedTuple):
     """The distances of a limit, and planes between its bodies, for `BLOCK` instants.
 
-    `plane` returns the distance of a pair from its points, and the derivative by a shift of the first body: the
-    direction of a plane between the bodies, (4,).
+    `plane` returns the distance of a pair from its points, and the direction of a plane between both, (4,).
     """
 
     moving: int  # how many points the first body of each pair has
@@ -55,6 +54,8 @@ class Limits(Displayed):
 
     robot: Robot
     all: tuple[Limit, ...]
+    _ways: dict[Limit, ca.Function | None] = field(default_factory=dict, init=False, repr=False)
+    _separating: dict[Limit, Separating] = field(default_factory=dict, init=False, repr=False)
 
     def __iter__(self) -> Iterator[Limit]:
         return iter(self.all)
@@ -88,10 +89,9 @@ class Limits(Displayed):
 
     @cached_property
     def function(self) -> ca.Function:
-        """Return the function of all values, one below the other.
+        """Return the function of all values, one below the other, of motions in {G} (18: pose, velocity, acceleration).
 
-        Its inputs are the motion of the platform in {G} (18: pose, velocity, acceleration), those of all carriers (18
-        each), the tensions [N] (m) and the platform's offset from its path (6).
+        Its inputs are those of the platform and of all carriers, tensions [N] (m) and the platform's offset (6).
         """
         others = [self._state.tensions, self._state.off_path]
         return of_motions("limits", self._bodies, others, [ca.vertcat(*self._values)])
@@ -157,16 +157,11 @@ class Limits(Displayed):
             )
         return self._separating[limit]
 
-    @cached_property
-    def _separating(self) -> dict[Limit, Separating]:
-        return {}
-
     def along(
         self, platform: Motion, carriers: Motion, tensions: np.ndarray | None = None, off_path: np.ndarray | None = None
     ) -> list[np.ndarray]:
-        """Return the values of each limit along a motion in {G}, (n, k).
+        """Return the values of each limit along a motion of platform (n, 6) and carriers (n, c, 6) in {G}, (n, k).
 
-        - `platform`, `carriers`: pose, velocity and acceleration, (n, 6) each and (n, c, 6) each.
         - `tensions`: (n, m) [N]; where they are nan, so are the values that depend on them. Default: zeros.
         - `off_path`: offset of the platform from its path, (n, 6) [m, rad]. Default: zeros.
         """
@@ -178,10 +173,6 @@ class Limits(Displayed):
         arguments.append(np.zeros((n, 6)) if off_path is None else off_path)
         (values,) = in_blocks(self._of_block, arguments)
         return [values[:, place] for place in self.places]
-
-    @cached_property
-    def _ways(self) -> dict[Limit, ca.Function | None]:
-        return {}
 
     def at_rest(self, platform: np.ndarray, carriers: np.ndarray) -> list[np.ndarray]:
         """Return the values of each limit at poses of platform (n, 6) and carriers (n, c, 6) at rest, (n, k)."""

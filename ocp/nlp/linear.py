@@ -20,11 +20,7 @@ MOST_ITERATIONS = 150  # of a pass: those that end well take 10 to 90
 
 
 class LinearDistances:
-    """The program, its solver, and the expressions that it needs about a motion.
-
-    - `program`: the true program.
-    - `shares`: where its points are.
-    """
+    """A true `program`, its solver, and the expressions that it needs about a motion; its points are at `shares`."""
 
     def __init__(self, program: Program):
         self._program, self.shares = program, program.shares

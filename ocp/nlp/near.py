@@ -25,7 +25,7 @@ class Near(Displayed):
     """The points at which a program keeps each limit, or each distance of one: of limits that are not local all."""
 
     chosen: np.ndarray  # (parts, points), see `parts`
-    holds: np.ndarray | None = None  # where each is in force, (parts, points); default: everywhere
+    holds: np.ndarray  # where each is in force, (parts, points)
 
     @classmethod
     def everywhere(cls, scenario: Scenario, shares: np.ndarray) -> Self:
@@ -47,20 +47,18 @@ class Near(Displayed):
     def widened(self, scenario: Scenario, shares: np.ndarray, motion: Deviation, reach: float) -> Self:
         """Return these points, those that `along` returns, and those where the motion may exceed what is left out."""
         slack, moved, extent = _kept(scenario, shares, motion)
-        holds = np.ones_like(self.chosen) if self.holds is None else self.holds
-        more = _wider(slack <= reach * extent) & holds | self._exceeded(slack, moved)
+        more = _wider(slack <= reach * extent) & self.holds | self._exceeded(slack, moved)
         return replace(self, chosen=self.chosen | more)
 
     @property
     def is_everywhere(self) -> bool:
         """Return whether nothing is left out."""
-        return bool((self.chosen if self.holds is None else self.chosen | ~self.holds).all())
+        return bool((self.chosen | ~self.holds).all())
 
     @property
     def between(self) -> np.ndarray:
         """Return what holds from each point to the next, (parts, points - 1)."""
-        holds = np.ones_like(self.chosen) if self.holds is None else self.holds
-        return holds[:, 1:] & holds[:, :-1]
+        return self.holds[:, 1:] & self.holds[:, :-1]
 
     def suffices(self, scenario: Scenario, shares: np.ndarray, motion: Deviation) -> bool:
         """Return whether a motion can exceed no limit where it is left out, at the points or between them."""

@@ -1,7 +1,7 @@
 """`Part`: a node or an interval of a program as functions of its columns, which `part_of` makes of expressions."""
 
 from collections.abc import Callable, Iterable
-from functools import cache, partial
+from functools import cache
 from itertools import chain
 from typing import NamedTuple, TypeAlias
 
@@ -41,8 +41,9 @@ def part_of(
     local: list[tuple[int, Callable[[tuple[int, ...]], Differentiable], list[Row]]] = []
     for index, (values, rows) in of_limits:
         if is_local(limits.all[index]):
-            function_of_some = partial(_function_of_some, unknowns, parameters, ca.vertcat(*values))
-            local.append((index, cache(function_of_some), rows))
+            every = ca.vertcat(*values)
+            of_some = cache(lambda some, of=every: function_of("near", unknowns, parameters, of[[*some]]))
+            local.append((index, of_some, rows))
         else:
             constraints.append((values, rows))
     values, rows = ([*chain(*parts)] for parts in zip(*constraints, strict=True))
@@ -50,17 +51,10 @@ def part_of(
     return Part(function_of(f"{name}_cost", unknowns, parameters, cost), function, rows, local)
 
 
-def _function_of_some(
-    unknowns: dict[str, ca.SX], parameters: dict[str, ca.SX], values: ca.SX, picked: tuple[int, ...]
-) -> Differentiable:
-    return function_of("near", unknowns, parameters, values[list(picked)])
-
-
 def function_of(name: str, unknowns: dict[str, ca.SX], parameters: dict[str, ca.SX], value: ca.SX) -> Differentiable:
     """Return the function of all unknowns and of those parameters on which its value depends.
 
-    CasADi would differentiate with respect to the parameters too and throw the result away: a Hessian took 6 times as
-    long.
+    CasADi would differentiate with respect to the parameters too: a Hessian took 6 times as long.
     """
     inputs = unknowns | {key: each for key, each in parameters.items() if ca.depends_on(value, each)}
     options = {"cse": True, "is_diff_in": [key in unknowns for key in inputs]}

@@ -116,8 +116,7 @@ def _between(short: Plan, enough: Plan | None, seconds: float, halfway: bool = F
 def _judged(plan: Plan, scenario: Scenario, seconds: float, suspects: Sequence[float] = ()) -> Plan:
     """Return a plan as one of the scenario's task, with its longest stop; not feasible if that takes too long.
 
-    With `suspects`, shares of the duration, stops that begin there and some others come first: if one takes too long,
-    the rest is not computed.
+    Stops that begin at `suspects`, shares of the duration, come first: if one takes too long, they suffice.
     """
     plan = replace(plan, scenario=replace(plan.scenario, task=scenario.task))
     if not plan.feasible:
@@ -149,12 +148,11 @@ def _judged(plan: Plan, scenario: Scenario, seconds: float, suspects: Sequence[f
     excess = Excess("stop_within", "platform", its.begins, its.duration, seconds, "s", "at most", why)
     status = MotionStatus.INFEASIBLE if scenario.is_fixed else MotionStatus.NOT_FOUND
     audit = replace(plan.audit, excess=[*plan.audit.excess, excess])
-    return replace(plan, status=status, audit=audit, offers=partial(_to_stop, plan, seconds))
 
+    def offers() -> Offers:
+        return Offers([*_longer(plan, seconds), *_longer_stop(plan, seconds)])
 
-def _to_stop(plan: Plan, seconds: float) -> Offers:
-    """Return the duration with which a plan's motion stops in so many seconds, and the `stop_within` that it keeps."""
-    return Offers([*_longer(plan, seconds), *_longer_stop(plan, seconds)])
+    return replace(plan, status=status, audit=audit, offers=offers)
 
 
 def _longer(plan: Plan, seconds: float) -> list[Relaxed]:
