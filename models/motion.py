@@ -31,11 +31,6 @@ class Motion(NamedTuple):
         """Return CasADi symbols of columns (6, 1), and of matrices of the shape `carriers` for the carriers."""
         return cls(*(ca.SX.sym(name, *(carriers if "carrier" in name else (6,))) for name in cls._fields))
 
-    def at_rest_by_default(self) -> Motion:
-        """Return the motion with a platform at rest where its velocity or acceleration is None."""
-        still = {name: np.zeros(6) for name in ("velocity", "acceleration") if getattr(self, name) is None}
-        return self._replace(**still)
-
     def arguments(self, home: np.ndarray) -> dict[str, Array]:
         """Return the parts by their names, of carriers at `home` and at rest where they are None."""
         carriers = {"carrier_pose": home, "carrier_velocity": np.zeros_like(home)}

@@ -50,8 +50,7 @@ def tensions(
         t_ref: Preferred tensions [N], a number or (m,) (default: 0).
         method, backend, **options: As for `towline.solve`.
 
-    Raises:
-        InputError: If an argument has a wrong type, shape or value.
+    Raises `InputError` if an argument has a wrong type, shape or value.
     """
     from ..models.dynamics import dynamics_of
     from ..models.files import as_robot
@@ -94,7 +93,8 @@ def pose_problem(
         if dynamics.robot.pulley_radii[cable]:
             kept, lost = "every cable off the axis and outside the sheave of its pulley", f"cable {cable + 1} is not"
         raise InputError(f"pose must keep {kept}, got one at which {lost}")
-    w = dynamics.required_wrench(*motion.at_rest_by_default(), wind=wind)
+    still = {name: np.zeros(6) for name in ("velocity", "acceleration") if getattr(motion, name) is None}
+    w = dynamics.required_wrench(*motion._replace(**still), wind=wind)
     return wrench_problem(dynamics.robot, A, w, t_ref=t_ref)
 
 

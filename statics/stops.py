@@ -33,7 +33,7 @@ from ..solvers.available_wrench import facets
 from ..solvers.in_place import RHO
 from .continuation import RESTS, continued
 from .distribution import wrench_problem
-from .team_stops import TeamStop, team_stop_along
+from .team_stops import team_stop_along
 from .winch_forces import has_winches, overloaded_winch, shares_of_winches
 
 if TYPE_CHECKING:
@@ -65,7 +65,6 @@ class Stop(Displayed):
         times: From 0 to its duration, (n,) [s].
         platform, carriers: Pose, velocity and acceleration in {G} at these times: (n, 6) each, and (n, c, 6) each.
         tensions: (n, m) [N]; where none exist inside the limits, those with the closest wrench.
-        distance: Length of the path of the platform until it rests [m].
         certificate: Certificate of the instant with the largest shortfall; None if tensions inside their limits always
             exist.
         limit: The limit of flying carriers, or of the force of a winch, that is exceeded most, with value and time;
@@ -80,7 +79,6 @@ class Stop(Displayed):
     platform: Motion
     carriers: Motion
     tensions: np.ndarray
-    distance: float
     certificate: Certificate | None
     limit: str = ""
     load: RigidLoad | None = None
@@ -89,6 +87,11 @@ class Stop(Displayed):
     def duration(self) -> float:
         """Return the time until the robot rests [s]."""
         return float(self.times[-1])
+
+    @property
+    def distance(self) -> float:
+        """Return the length of the path of the platform until it rests [m]."""
+        return float(np.linalg.norm(np.diff(self.platform[0][:, :3], axis=0), axis=1).sum())
 
     @property
     def feasible(self) -> bool:
@@ -141,7 +144,8 @@ def _stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Stop:
     """Stop a robot that carries nothing else."""
     end = trajectory.duration or 0.0
     if any(carrier.efforts for carrier in robot.carriers):
-        return _of_team(robot, team_stop_along(robot, trajectory, begins))
+        times, tau, platform, carriers, tensions, _, limit = team_stop_along(robot, trajectory, begins)
+        return Stop(robot, float(tau[0]), float(tau[-1]), times, platform, carriers, tensions, None, limit)
     trajectory = continued(trajectory, together=False)
     best: tuple[tuple[int, bool, float], Stop, TensionProblem | None] | None = None
     instants = cache(lambda first: _instants(robot, trajectory, first))  # which all attempts have in common
@@ -158,13 +162,6 @@ def _stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Stop:
             best = rank, found, worst if missing > MISSING * robot.force_scale else None
     assert best is not None
     return best[1] if best[2] is None else replace(best[1], certificate=certify(best[2]))
-
-
-def _of_team(robot: Robot, found: TeamStop) -> Stop:
-    times, tau, platform, carriers, tensions, _, limit = found
-    distance = float(np.linalg.norm(np.diff(platform[0][:, :3], axis=0), axis=1).sum())
-    ends = float(tau[0]), float(tau[-1])
-    return Stop(robot, *ends, times, platform, carriers, tensions, distance, certificate=None, limit=limit)
 
 
 def beginnings(trajectory: Trajectory, period: float) -> np.ndarray:
@@ -385,8 +382,7 @@ def _audited(robot: Robot, trajectory: Trajectory, law: _Law) -> tuple[Stop, flo
     tensions = solve_batch(A, w, robot.t_min, robot.t_max, t_ref=near, length=robot.length, rho=RHO).tensions
     missing = np.linalg.norm((w - (A @ tensions[:, :, None])[..., 0]) * robot.wrench_scale, axis=1)
     worst = int(np.argmax(missing))
-    distance = float(np.linalg.norm(np.diff(platform[0][:, :3], axis=0), axis=1).sum())
     limit = overloaded_winch(robot, law.times, dynamics.cable_lengths(platform[0], carriers[0]), tensions)
     ends = float(law.tau[0]), float(law.tau[-1])
-    found = Stop(robot, *ends, law.times, slowed, _slowed(carriers, law), tensions, distance, None, limit)
+    found = Stop(robot, *ends, law.times, slowed, _slowed(carriers, law), tensions, None, limit)
     return found, float(missing[worst]), wrench_problem(robot, A[worst], w[worst])
