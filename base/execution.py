@@ -53,8 +53,7 @@ class Execution:
         resume: True to continue the checkpoint if the file exists. It must belong to the same jobs.
         progress: Function that is called with (jobs done, jobs in total, those with a good result).
 
-    Raises:
-        InputError: If a field has a wrong value.
+    Raises `InputError` if a field has a wrong value.
     """
 
     workers: int = 1
@@ -77,11 +76,7 @@ class Execution:
         object.__setattr__(self, "checkpoint", path)
 
     def check_alone(self) -> None:
-        """Check that no field is set that applies only to many runs.
-
-        Raises:
-            InputError: If one is.
-        """
+        """Raise InputError if a field is set that applies only to many runs."""
         if self.workers != 1:
             raise InputError(f"workers must be 1 without runs, got {self.workers}")
         if self.checkpoint is not None or self.scheduler is not None:
@@ -103,10 +98,9 @@ class Workers:
     def map(
         self, function: Callable[..., Result], jobs: Iterable[tuple[Any, ...]], in_order: bool = True
     ) -> Iterator[Result]:
-        """Yield `function(*job)` of each job while the next ones are being evaluated.
+        """Yield `function(*job)` of each job while the next ones are being evaluated, in order or as they are done.
 
-        Results come in the order of the jobs, or else as soon as they are there, so that no worker waits for a slow
-        job. Raises `SolverError` if workers end before their work is done.
+        Raises `SolverError` if workers end before their work is done.
         """
         under_way: list[Future[Result]] = []
         try:
@@ -139,9 +133,7 @@ def started(
 ) -> Iterator[tuple[Workers, Checkpoint | None]]:
     """Start workers and open the checkpoint, if there is one, until the end of the block.
 
-    - `header`: function that returns everything on which the results depend.
-
-    Raises `InputError` if there is no such scheduler, or the checkpoint cannot be used.
+    `header` returns all that the results depend on. Raises `InputError` if scheduler or checkpoint cannot be used.
     """
     opened = nullcontext()
     if execution.checkpoint is not None:

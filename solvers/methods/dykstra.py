@@ -26,8 +26,7 @@ _STEP = 1e-11
 # become a proof that they do not meet.
 _CHECK = 50
 
-# Rounding of s, and of the multipliers, in that question.
-_ROUNDING = 1e-12
+_ROUNDING = 1e-12  # rounding of s, and of the multipliers, in that question
 
 
 class Dykstra(Method):

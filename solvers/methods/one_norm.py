@@ -8,8 +8,7 @@ from .method import Method, Proposal, StandardForm
 from .numerics.feasible_polytope import EMPTY, FAR, meet
 from .numerics.linear_program import optimise
 
-# Corners whose norms differ by less, relative to the largest tension among them, count as equally good.
-_TIE = 1e-10
+_TIE = 1e-10  # corners whose norms differ by less, over their largest tension, count as equally good
 
 
 class OneNorm(Method):
