@@ -31,8 +31,7 @@ class Symmetry(NamedTuple):
 class Mirrors:
     """Random symmetries of a robot's layout.
 
-    A plane of symmetry is through the middle of all anchors' bounds, and through that of all attachments' bounds. It is
-    vertical, because weight has a direction.
+    A plane is vertical, as weight has a direction, through the middles of all anchors' and attachments' bounds.
     """
 
     def __init__(self, variables: Variables):

@@ -72,8 +72,7 @@ def save_yaml(model: BaseModel, file: str | os.PathLike[str], argument: str = "f
 def read_yaml(path: Path, model: type[Model]) -> Model:
     """Read a YAML file as a `model`.
 
-    Raises `InputError` if the file cannot be read, is too large, is not YAML or is not a valid `model`: one line
-    that names the file.
+    Raises `InputError`, one line that names the file, if it cannot be read or is not a valid `model`.
     """
     where = printable(str(path))
     try:

@@ -54,13 +54,10 @@ def dataset(
 
 
 def save(result: xr.Dataset, file: str | os.PathLike[str]) -> Path:
-    """Save a result of `sample` atomically: as NetCDF, or as a Zarr folder if the path ends in .zarr.
+    """Save a result of `sample` atomically: as NetCDF, or as a Zarr folder (extra `cluster`) if the path ends in .zarr.
 
-    `xarray.load_dataset` reads the former, `xarray.open_zarr` the latter (extra `cluster`). Attributes of the run, such
-    as its duration, are left out, so that equal results are equal NetCDF files.
-
-    Raises `InputError` if an argument has a wrong type, the file cannot be written, or is a Zarr folder that exists
-    already.
+    Attributes of the run, such as its duration, are left out, so that equal results are equal NetCDF files. Raises
+    `InputError` if an argument has a wrong type, the file cannot be written, or is a Zarr folder that exists.
     """
     import xarray as xr
 
