@@ -70,12 +70,15 @@ class Checkpoint:
 
 @contextmanager
 def open_checkpoint(path: Path, kind: Kind, header: dict[str, Any], resume: bool) -> Iterator[Checkpoint]:
-    """Open a checkpoint of a `kind` at `path` for a run that `header` describes: all that the results depend on.
+    """Open a checkpoint for a run that `header` describes.
 
+    - `path`: the file.
+    - `kind`: what it holds.
+    - `header`: everything that the results depend on, by names for messages; ready for JSON.
     - `resume`: False: create a new file. True: continue the file, or create it if there is none or an empty one.
 
-    Raises `InputError`, and changes nothing, if the file cannot be written, exists and `resume` is False, or is no
-    checkpoint, of another run, damaged, or in use.
+    Raises `InputError` if the file cannot be written; if it exists and `resume` is False; if it is no checkpoint, of
+    another run, damaged, or in use. The file is not changed then.
     """
     target = check_writable(path)
     try:

@@ -38,7 +38,11 @@ FREE = 0  # the number of a space without a text; its length counts from its hea
 
 
 class _Account:
-    """Count the memory that the contents of a file of a `size` will take, up to what is `accepted` [bytes]."""
+    """Count the memory that the contents of a file will take, up to what is accepted.
+
+    - `size`: of the file [bytes].
+    - `accepted`: the most memory for its contents [bytes].
+    """
 
     def __init__(self, size: int, always: int = ALWAYS_ACCEPTED):
         self.size, self.accepted = size, max(always, EXPANSION * size)
@@ -94,10 +98,15 @@ def check_heaps(content: bytes | mmap.mmap) -> None:
 def check_hdf5(
     file: h5py.File, size: int, wanted: Callable[[str], bool] = lambda name: True, always: int = ALWAYS_ACCEPTED
 ) -> dict[str, h5py.Dataset]:
-    """Return the datasets at the top of an open file of a `size` [bytes] that are `wanted`, default: all, by name.
+    """Return the datasets at the top of an open file that are wanted, none of whose data has been read, by their names.
 
-    None of their data has been read. Contents may always take `always` [bytes], however small the file is. Raises
-    `InputError` if part is in another file, it declares or expands to much more than its size, or is not plain or gzip.
+    - `file`: the open file.
+    - `size`: its size [bytes].
+    - `wanted`: whether a dataset is read; the others are not looked at. Default: all.
+    - `always`: memory that the contents may take, however small the file is [bytes].
+
+    Raises `InputError` if part of it is in another file, if it declares or expands to much more than its size, or is
+    compressed in another way than gzip.
     """
     import h5py
 

@@ -53,7 +53,8 @@ class Execution:
         resume: True to continue the checkpoint if the file exists. It must belong to the same jobs.
         progress: Function that is called with (jobs done, jobs in total, those with a good result).
 
-    Raises `InputError` if a field has a wrong value.
+    Raises:
+        InputError: If a field has a wrong value.
     """
 
     workers: int = 1
@@ -76,7 +77,11 @@ class Execution:
         object.__setattr__(self, "checkpoint", path)
 
     def check_alone(self) -> None:
-        """Raise InputError if a field is set that applies only to many runs."""
+        """Check that no field is set that applies only to many runs.
+
+        Raises:
+            InputError: If one is.
+        """
         if self.workers != 1:
             raise InputError(f"workers must be 1 without runs, got {self.workers}")
         if self.checkpoint is not None or self.scheduler is not None:
@@ -98,9 +103,10 @@ class Workers:
     def map(
         self, function: Callable[..., Result], jobs: Iterable[tuple[Any, ...]], in_order: bool = True
     ) -> Iterator[Result]:
-        """Yield `function(*job)` of each job while the next ones are being evaluated, in order or as they are done.
+        """Yield `function(*job)` of each job while the next ones are being evaluated.
 
-        Raises `SolverError` if workers end before their work is done.
+        Results come in the order of the jobs, or else as soon as they are there, so that no worker waits for a slow
+        job. Raises `SolverError` if workers end before their work is done.
         """
         under_way: list[Future[Result]] = []
         try:
@@ -133,7 +139,9 @@ def started(
 ) -> Iterator[tuple[Workers, Checkpoint | None]]:
     """Start workers and open the checkpoint, if there is one, until the end of the block.
 
-    `header` returns all that the results depend on. Raises `InputError` if scheduler or checkpoint cannot be used.
+    - `header`: function that returns everything on which the results depend.
+
+    Raises `InputError` if there is no such scheduler, or the checkpoint cannot be used.
     """
     opened = nullcontext()
     if execution.checkpoint is not None:

@@ -68,9 +68,10 @@ class Contents(NamedTuple):
 
 
 def save_netcdf(contents: Contents, path: Path, compressed: Collection[str] = ()) -> Path:
-    """Save contents as NetCDF 4 atomically, with `compressed` variables; equal contents are equal files.
+    """Save contents as NetCDF 4 atomically; `xarray.load_dataset` reads them.
 
-    Raises `InputError` if the folder cannot be written to, or the disk is full.
+    Equal contents are equal files. The variables named by `compressed` are compressed. Raises `InputError` if the
+    folder cannot be written to, or the disk is full.
     """
     import h5netcdf
     import h5py

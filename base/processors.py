@@ -40,7 +40,8 @@ def at_most(count: int) -> Iterator[None]:
 def one_thread_each() -> Iterator[None]:
     """Let processes that start inside the block do linear algebra with one thread: there is a process a processor.
 
-    So does this process if it loads its libraries inside the block. Variables that the user has set stay.
+    This process does so too if it loads its libraries inside the block. Environment variables that the user has set
+    keep their values.
     """
     names = [name for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS") if name not in os.environ]
     os.environ.update(dict.fromkeys(names, "1"))

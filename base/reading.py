@@ -15,7 +15,8 @@ files_read: deque[Path] = deque(maxlen=1000)  # the last ones: a command must no
 def check_file(path: Path, what: str, largest: int) -> int:
     """Return the size of a regular file [bytes]; `what` describes it in the message.
 
-    Raises `InputError` if there is none, it is a folder, a device or a pipe, which may never end, or too large.
+    Raises `InputError` if there is no such file, it is a folder, a device or a pipe, from which reading may never
+    end, or too large.
     """
     where = printable(str(path))
     try:

@@ -8,14 +8,18 @@ FEASIBILITY = 1e-9
 # that they give, both relative.
 OPTIMALITY = 1e-8
 
-AT_LIMIT = 1e-9  # a limit this near, relative to the size of the tensions, may have a multiplier
-ROUNDING = 1e-13  # rounding of a matrix-vector product, relative to the sum of the absolute terms: 450 epsilons
+# A limit this near, relative to the size of the tensions, may have a multiplier.
+AT_LIMIT = 1e-9
+
+# Rounding of a matrix-vector product, relative to the sum of the absolute terms: 450 machine epsilons.
+ROUNDING = 1e-13
 
 # The terms of A t count at most at this many times what the problem requires: tensions that cancel to more digits than
 # that give no wrench that they are asked for.
 CANCELLED = 1e10
 
-RANK = 1e-12  # singular values below this part of the largest are zero
+# Singular values below this part of the largest are zero.
+RANK = 1e-12
 
 # Directions with singular values between RANK and this part of the largest are required only if w would be missed
 # without them: geometry written with twelve digits makes them out of nothing, and tensions that serve them serve the
@@ -38,5 +42,8 @@ ROUNDED_PULL = 1e-15
 # The heaviest weight of a problem, relative to the lightest: beyond it least squares have no digits left.
 WEIGHTS_APART = 1e14
 
-SLACK = 1e-12  # how far a tension may pass a limit before it is moved back, relative to the size of the tensions
-DECISIVE = 1e-5  # relative change of the cost if the limits move by the slack: above it rounding chose the tensions
+# How far a tension may pass a limit before it is moved back, relative to the size of the tensions.
+SLACK = 1e-12
+
+# Relative change of the cost if the limits move by the slack: above it rounding chose the tensions.
+DECISIVE = 1e-5

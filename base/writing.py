@@ -20,7 +20,8 @@ NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 def whole_file(path: Path) -> Iterator[Path]:
     """Yield a temporary file beside `path`; it is renamed to `path` when the block ends without an exception.
 
-    A link is followed to its file; missing folders are created. Raises `InputError` if it cannot be written.
+    A link is followed to its file; missing folders are created. Raises `InputError` if the file cannot be written.
+    An existing file is not changed.
     """
     target = check_writable(path)
 

@@ -25,9 +25,12 @@ _MISSING_COSTS = 25.0  # cost, in force scales, of missing a bound of the room b
 
 
 def anneal(evaluation: Evaluation, goal: Goal, moves: Moves, rng: np.random.Generator, until: float) -> np.ndarray:
-    """Return the variables of a good layout for the rows of an evaluation, (p,), of few poses: it is repeated often.
+    """Return the variables of a good layout for the rows of an evaluation, (p,).
 
-    `moves` are the random changes. It ends at `until`, by `time.perf_counter` [s]: with fewer moves if they take long.
+    - `evaluation`: an evaluation of few poses, because it is repeated thousands of times.
+    - `goal`: the objective.
+    - `moves`: the random changes.
+    - `until`: time of `time.perf_counter` at which it ends [s]: where an evaluation takes long, with fewer moves.
     """
     force = evaluation.variables.robot.force_scale
 

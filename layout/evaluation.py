@@ -95,7 +95,12 @@ class Slopes(NamedTuple):
 
 
 class Evaluation:
-    """Evaluate layouts by the `variables` of a design at `rows` of requirements, in a `room` (default: no bounds)."""
+    """Evaluate layouts at the rows of requirements.
+
+    - `variables`: those of the design.
+    - `rows`: poses and wrenches.
+    - `room`: bounds of distances and lengths (default: none).
+    """
 
     def __init__(self, variables: Variables, rows: Rows, room: Room = NO_BOUNDS):
         robot = variables.robot

@@ -82,11 +82,14 @@ class _Program:
 def maximise(
     evaluation: Evaluation, goal: Goal, y: np.ndarray, until: float, delta: float = 0.1, programs: int = PROGRAMS
 ) -> None:
-    """Move the variables y (p,) to a local maximum of a goal, in place: an interrupt keeps what is reached.
+    """Move the variables to a local maximum of a goal, in place: an interrupt keeps what is reached.
 
     - `evaluation`: of all rows that count.
+    - `goal`: the objective.
+    - `y`: where to start, (p,); it is moved.
     - `until`: time of `time.perf_counter` at which it ends early [s].
-    - `delta`, `programs`: longest step of the first program, of the range of each variable, and most programs.
+    - `delta`: longest step of the first program, of the range of each variable.
+    - `programs`: most linear programs.
     """
     least, (value, every) = LITTLE * evaluation.variables.robot.force_scale, merit(evaluation, goal, y)
     for _ in range(programs):

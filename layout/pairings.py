@@ -30,11 +30,12 @@ def best_pairing(
 ) -> tuple[np.ndarray, int]:
     """Return whose attachment each cable gets, (m,), for the largest smallest margin, and the number of pairings.
 
-    The least margin over a few rows bounds the one over all: pairings are computed at all rows in the order of this
-    bound, until it is no larger than the best. If no pairing has the room of the requirements, the robot's own is
-    returned.
+    The least margin over a few rows bounds the one over all. So pairings are computed at all rows in the order of this
+    bound, until it is no larger than the best.
 
+    - `robot`, `rows`: the robot with its points, and the rows that count.
     - `cables`: cables that exchange their attachments, at most `MOST_PAIRED`.
+    - `requirements`: their room is kept. If no pairing has it, the robot's own is returned.
     """
     room = room_of(robot, requirements)
     own, kept = np.arange(robot.m), np.flatnonzero(robot.dof_mask)

@@ -201,9 +201,10 @@ class Design(Drawn, Reported, Displayed):
         return [Section("Why it is infeasible", facts), Section("What you can try", [idea])]
 
     def figures(self) -> dict[str, Figure]:
-        """Draw the robot `before` and `after` the design, at the pose that limits the margin most, else at home.
+        """Draw the robot `before` and `after` the design, by these names.
 
-        If the requirements are impossible, only `before` is drawn, at the impossible pose.
+        Both are at the pose that limits the margin most, or at home if there is none. If the requirements are
+        impossible, only `before` is drawn, at the impossible pose.
         """
         one, still = self._limiting, np.zeros(6)
         drawn = {}

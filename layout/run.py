@@ -56,7 +56,8 @@ def design(
 
     After an interrupt the result is the best so far; it has a certificate if the requirements are impossible.
 
-    Raises `InputError` if an argument is wrong, or the requirements do not fit the robot.
+    Raises:
+        InputError: If an argument is wrong, or the requirements do not fit the robot.
     """
     chosen = as_robot(robot)
     if requirements is not None:

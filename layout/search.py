@@ -175,9 +175,9 @@ class _Search:
     def _improve(self, what: str, delta: float, programs: int = PROGRAMS, limits: bool = False) -> None:
         """Improve a layout, or its tension limits alone, by linear programs, and keep it if it is the best.
 
-        Where an audit finds it worse, the programs continue with the poses that this has added. Steps of points may
-        lose the margin at other poses, so at last free tension limits restore it, which for given points are a linear
-        problem.
+        Where an audit finds it worse than the best one, the programs continue with the poses that this has added. Steps
+        of points may lose the margin again at other poses, so at last the tension limits restore it, if they are free:
+        for given points they are a linear problem.
         """
         found, variables = self.found, self._variables
         ends = min(self._until, time.perf_counter() + _IMPROVING * self._requirements.time_limit)

@@ -31,7 +31,8 @@ class Symmetry(NamedTuple):
 class Mirrors:
     """Random symmetries of a robot's layout.
 
-    A plane is vertical, as weight has a direction, through the middles of all anchors' and attachments' bounds.
+    A plane of symmetry is through the middle of all anchors' bounds, and through that of all attachments' bounds. It is
+    vertical, because weight has a direction.
     """
 
     def __init__(self, variables: Variables):

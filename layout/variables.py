@@ -51,7 +51,10 @@ class Variables:
         return np.clip(_layout_of(self.robot)[first], self.low, self.high)
 
     def robot_at(self, y: np.ndarray) -> Robot:
-        """Return the robot with the numbers of a vector, or raise InputError if no such robot exists."""
+        """Return the robot with the numbers of a vector.
+
+        Raises `InputError` if no such robot exists.
+        """
         numbers = dict(zip(PARTS, parts(self.layout(y), self.robot.m), strict=True))
         data = self.robot.model_dump()
         cables = [
@@ -72,7 +75,10 @@ def by_cable(layout: np.ndarray, m: int) -> np.ndarray:
 
 
 def variables_of(robot: Robot, requirements: Requirements) -> Variables:
-    """Return the variables of the free numbers of a robot, or raise InputError if the requirements do not fit it."""
+    """Return the variables of the free numbers of a robot.
+
+    Raises `InputError` if the requirements do not fit the robot.
+    """
     _check(robot, requirements)
     fixed, column_of = _layout_of(robot), {}
     low: list[float] = []

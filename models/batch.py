@@ -90,9 +90,10 @@ def _evaluated(function: ca.Function, arguments: dict[str, Any]) -> dict[str, np
 
 
 def in_blocks(block: ca.Function, arguments: list[np.ndarray], size: int = BLOCK) -> list[np.ndarray]:
-    """Return the outputs of a function of one row that is mapped to `size` of them, (n, k) each, like `arguments`.
+    """Return the outputs of a function of one row that is mapped to `size` of them, (n, k) each.
 
-    k are the elements that are not zero by structure, by columns. Raises `RuntimeError` if the evaluation fails.
+    `arguments` are (n, k) each. k are the elements of one row's matrix that are not zero by structure, column by
+    column. Raises `RuntimeError` if the evaluation fails.
     """
     n = len(arguments[0])
     # Of a broadcast argument and one row more NumPy makes columns, which no buffer takes.

@@ -69,11 +69,13 @@ class CasprImport(Displayed):
 
 
 def read_caspr(folder: str | os.PathLike[str], cable_set: str | None = None) -> CasprImport:
-    """Read a `folder` of one robot, with one *_bodies.xml and one *_cables.xml, as CASPR has them.
+    """Read a folder with one *_bodies.xml and one *_cables.xml as CASPR has them.
 
+    - `folder`: the folder of one robot.
     - `cable_set`: id of the set of cables; default: the file's default_cable_set.
 
-    Raises `InputError`, one line with file and element, if a file is wrong, or towline cannot express the robot.
+    Raises `InputError` if a file is missing or wrong, or towline cannot express the robot: one line that names the file
+    and the element.
     """
     place = Path(folder)
     notes = Counter[str]()

@@ -88,9 +88,10 @@ class Dynamics(Displayed):
 
     @one_array
     def wrench_jacobian(self, pose: Array, tensions: Array, carrier_pose: Array | None = None) -> Array:
-        """Return the derivative of A t with respect to the pose at constant tensions, (..., 6, 6); see `stiffness` too.
+        """Return the derivative of A t with respect to the pose at constant tensions, (..., 6, 6).
 
-        Arguments as in `wrench_matrix`; `tensions` are (..., m) [N].
+        Arguments as in `wrench_matrix`; `tensions` are (..., m) [N]. For displacements of the CoM and turns about it
+        see `stiffness`.
         """
         if numeric := self._numeric(pose, tensions, carrier_pose):
             return numeric.wrench_jacobian(pose, tensions, carrier_pose)
@@ -98,7 +99,10 @@ class Dynamics(Displayed):
 
     @several_arrays
     def points(self, pose: Array, carrier_pose: Array | None = None) -> tuple[Array, Array]:
-        """Return anchors and attachments in {G}, (..., m, 3) each [m]. Arguments as in `wrench_matrix`."""
+        """Return the anchors and the attachments of the cables in {G}, (..., m, 3) each [m].
+
+        Arguments as in `wrench_matrix`.
+        """
         if numeric := self._numeric(pose, carrier_pose):
             return numeric.points(pose, carrier_pose)
         result = self._call("points", pose=pose, carrier_pose=carrier_pose)
@@ -147,8 +151,9 @@ class Dynamics(Displayed):
     def carried_wrench(self, pose: Array, velocity: Array, acceleration: Array, load: Array) -> Array:
         """Return the wrench that a load fixed to the platform needs in addition to `required_wrench`, (..., 6), in {G}.
 
-        Arguments as in `required_wrench`, weight included. The `load` is (..., 10): mass [kg], CoM in the platform
-        frame (3) [m], and inertia about that CoM in platform axes (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2].
+        It is force [N] and moment about the platform's CoM [N m], weight included. Arguments as in
+        `required_wrench`. The `load` is (..., 10): mass [kg], CoM in the platform frame (3) [m], and the inertia about
+        that CoM in platform axes (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2].
         """
         motion = {"pose": pose, "velocity": velocity, "acceleration": acceleration}
         return self._call("carried_wrench", load=load, **motion)["w"]
@@ -228,7 +233,8 @@ class Dynamics(Displayed):
         - `elastic`: True: elastic cables, each with its `stiffness`; False: constant tensions, only the geometry
           changes.
 
-        Raises `InputError` if `elastic` and a cable has no stiffness.
+        Raises:
+            InputError: If `elastic` and a cable has no stiffness.
         """
         if flag("elastic", elastic):
             for index, cable in enumerate(self.robot.cables):
@@ -254,7 +260,8 @@ class Dynamics(Displayed):
           slack and are ignored.
         - `elastic`: False: inextensible cables, which permit 6 - rank motions, or none.
 
-        Raises `InputError` if an argument has a wrong shape or value, or `elastic` and a cable has no stiffness.
+        Raises:
+            InputError: If an argument has a wrong shape or value, or `elastic` and a cable has no stiffness.
         """
         home = self.robot.carrier_home
         places = home if carrier_pose is None else carrier_pose

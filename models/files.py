@@ -19,7 +19,9 @@ AnyRobot: TypeAlias = Robot | str | os.PathLike[str]
 def load(name: str | os.PathLike[str]) -> Robot:
     """Load a robot of the library by its `name`, one of `available()`, or any YAML file by its path.
 
-    Raises `InputError` if there is none, or the file is not a valid robot: one line with file, field and value.
+    Raises:
+        InputError: If there is no such robot or file, or the file is not a valid robot: one line with file, field and
+            value.
     """
     path = file_path("robot", name, "a name of the library or the path of a YAML file")
     text = os.fspath(name)
@@ -35,7 +37,10 @@ def load(name: str | os.PathLike[str]) -> Robot:
 
 
 def as_robot(robot: object) -> Robot:
-    """Return a robot as it is, or load it by its name or path; raise InputError if it is neither."""
+    """Return a robot as it is, or load it by its name or path.
+
+    Raises `InputError` if it is neither, or `load` refuses it.
+    """
     if isinstance(robot, Robot):
         return robot
     if isinstance(robot, str | os.PathLike):

@@ -17,13 +17,15 @@ from .record import record_of
 from .robot import Robot
 
 ROWS_WORTH_A_THREAD = 50_000  # some milliseconds
+
 _RESULTS = 5  # of `core.lines`
 _COLUMNS = {"anchor": 0, "attachment": 3, "radius": 6}  # of `Mechanics.columns_by_geometry`
 
 
 class Mechanics:
-    """Compute the mechanics of a robot that `record.fits`: arguments, results and errors are those of `Dynamics`.
+    """Compute a robot's mechanics at one pose or at many: arguments, results and errors are those of `Dynamics`.
 
+    - `robot`: one that `record.fits`.
     - `record`: the record to read at each call, whose ends of cables may change; default: that of the robot.
     """
 
@@ -136,9 +138,11 @@ def derivatives(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return how wrenches depend on p numbers of the cables, by the `names` of `Robot.parameter_values`.
 
-    That is the derivative of the column of its cable, (n, 6, p) [1/m, -], and that cable's index, (p,), at poses of the
-    platform, (n, 6), and carriers, (n, c, 6). Raises `ValueError` if the robot has no such number; `InputError` if the
-    numeric core has no room for it.
+    That is the derivative by each number of the column of its cable, (n, 6, p) [1/m, -], and the index of that cable,
+    (p,), at poses of the platform, (n, 6), and of the carriers, (n, c, 6), in {G} [m, rad].
+
+    Raises `ValueError` if the robot has no such number; `InputError` if the robot has more cables or carriers than
+    the numeric core has room for.
     """
     places = [locate(name, robot.cables) for name in names]
     cables = np.array([place.cable for place in places], dtype=int)

@@ -36,7 +36,8 @@ class Parameter(NamedTuple):
 def locate(name: object, cables: tuple[Cable, ...] | None = None) -> Parameter:
     """Return which number a name stands for.
 
-    Raises `ValueError` with "must be ..., got ..." if it is no such name, or `cables` have no such number.
+    Raises `ValueError` if it is not such a name or, if `cables` are given, they have no such number: "must be ...,
+    got ...".
     """
     match = _NAME.fullmatch(name) if isinstance(name, str) else None
     if match is None:

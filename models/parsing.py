@@ -72,7 +72,8 @@ def save_yaml(model: BaseModel, file: str | os.PathLike[str], argument: str = "f
 def read_yaml(path: Path, model: type[Model]) -> Model:
     """Read a YAML file as a `model`.
 
-    Raises `InputError`, one line that names the file, if it cannot be read or is not a valid `model`.
+    Raises `InputError` if the file cannot be read, is too large, is not YAML or is not a valid `model`: one line
+    that names the file.
     """
     where = printable(str(path))
     try:

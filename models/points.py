@@ -66,8 +66,11 @@ def attachments(robot: Any, pose: np.ndarray) -> np.ndarray:
 def default_home(anchor_points: np.ndarray, attachment_points: np.ndarray) -> np.ndarray:
     """Return a home pose in {G}, (6,) [m, rad]: level, amid the anchors, or below them if the platform hangs.
 
-    It hangs if the heights of its anchors in {G}, (m, 3), differ by less than a tenth of their horizontal spread: then
-    it is as far below their centre as they are wide. Attachments are (m, 3) in the platform frame [m].
+    The platform is treated as suspended if the heights of its anchors differ by less than a tenth of their horizontal
+    spread. Then it is placed as far below their centre as they are wide.
+
+    - `anchor_points`: in {G}, (m, 3) [m].
+    - `attachment_points`: in the platform frame, (m, 3) [m].
     """
     centre = anchor_points.mean(axis=0)
     spread = np.linalg.norm(anchor_points[:, :2] - centre[:2], axis=1).max()

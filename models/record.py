@@ -65,9 +65,10 @@ def fits(robot: Robot) -> bool:
 
 @lru_cache(maxsize=16)
 def record_of(robot: Robot) -> np.ndarray:
-    """Return the record of a robot, of `RECORD`, shape (), kept for the next call; stiffness and damping may be 0.
+    """Return the record of a robot, of `RECORD`, shape (); it is kept for the next call and cannot be written to.
 
-    Raises `InputError` if the robot has more cables, carriers or actuators than the core has room for.
+    Stiffness and damping are those of the file, 0 where it has none. Raises `InputError` if the robot has more
+    cables, carriers or actuators than the core has room for.
     """
     for name, most, count in _counts(robot):
         if count > most:

@@ -30,14 +30,17 @@ from .rotation import Matrix, angles_of, body_rate, inverse_rate_matrix, rate_ma
 
 
 class RelativeDynamics(Displayed):
-    """Compute the dynamics as paper F (docs/theory.md) does: in {A}, with the carrier's motion in a separate term, D_B.
+    """Compute the dynamics as paper F does: in {A}, with the carrier's motion in a separate term, D_B (Eq. 38).
+
+    docs/theory.md names the paper.
 
     `pose`, `velocity` and `acceleration` are those of the platform frame relative to {A}, in the axes of {A};
     `carrier_pose`, `carrier_velocity` and `carrier_acceleration` are those of {A} in {G}, default: at home and at rest.
     Each is (..., 6) [m, rad], since the only carrier needs no dimension of its own.
 
-    `robot` is one with one carrier, as for `Dynamics`; `functions` are the CasADi Functions by name, with named inputs
-    and outputs. Every method raises `InputError`, in one line, for an argument of a wrong shape or value.
+    `robot` is a `Robot` with one carrier, the name of one in the library, or the path of a robot file; `functions` are
+    the CasADi Functions by name, with named inputs and outputs. Raises `InputError` if the robot is none of these.
+    Every method raises it, in one line, for an argument of a wrong shape or value.
     """
 
     def __init__(self, robot: AnyRobot):

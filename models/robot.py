@@ -106,7 +106,8 @@ class Robot(Part):
     def parameter_values(self, names: Iterable[str]) -> np.ndarray:
         """Return cable parameters by name, such as `cables[2].anchor.x` or `cables[2].encoder.scale`, (p,) [m, -, 1/m].
 
-        Raises `InputError` if `names` is not a list of names, or the robot has no such parameter.
+        Raises:
+            InputError: If `names` is not a list of names, or the robot has no such parameter.
         """
         try:
             listed = None if isinstance(names, str) else list(names)
@@ -142,8 +143,10 @@ class Robot(Part):
     def drawn(self, count: int, seed: int = 0) -> tuple[Robot, ...]:
         """Sample `count` robots from the `uncertainty` of the file; the samples have no uncertainty of their own.
 
-        The first robots of a `seed` do not depend on the count. Raises `InputError` if the robot has no uncertainty, an
-        argument is wrong, or a sample is geometrically invalid.
+        The first robots of a `seed` do not depend on the count.
+
+        Raises:
+            InputError: If the robot has no uncertainty, an argument is wrong, or a sample is geometrically invalid.
         """
         whole_number("count", count, 1, 1_000_000)
         whole_number("seed", seed, 0, 2**63 - 1)
@@ -335,10 +338,12 @@ class Robot(Part):
 
 
 def check_pulleys(offsets: np.ndarray, axes: np.ndarray, radii: np.ndarray, cables: tuple[Cable, ...]) -> None:
-    """Refuse an attachment on the swivel axis of its pulley, or inside the sheave, by a ValueError that names it.
+    """Refuse an attachment on the swivel axis of its pulley, or inside the sheave.
 
     - `offsets`, `axes`: from anchors to attachments, (m, 3) [m], and the swivel axes, (m, 3) [-], in {G} at home.
     - `radii`: radii of the sheaves, (m,) [m]; 0 for a cable without.
+
+    Raises `ValueError` that names the attachment.
     """
     up = np.sum(offsets * axes, axis=1)
     across = np.linalg.norm(offsets - up[:, None] * axes, axis=1)
@@ -353,8 +358,9 @@ def check_pulleys(offsets: np.ndarray, axes: np.ndarray, radii: np.ndarray, cabl
 def usual_drive(carriers: Iterable[Carrier], cables: Sequence[Cable]) -> Drive:
     """Return the drive of a robot whose file has none, from its cables and the carriers that hold these.
 
-    Cables keep their lengths if all hang from carriers that move them about, such as quadrotors, without winch, encoder
-    and pulley. Others have winches. Raises `ValueError` if one of these has a length to keep.
+    Cables keep their lengths if all hang from carriers that move them about, such as quadrotors, and none has a winch,
+    or an encoder or a pulley, which belong to one. All others have winches. Raises `ValueError` if one of these has a
+    length to keep.
     """
     towed = all(carrier.tows for carrier in carriers)
     winches = any(part is not None for cable in cables for part in (cable.winch, cable.encoder, cable.pulley))

@@ -90,9 +90,10 @@ class Block(Part):
 
 
 class ConvexMesh(Part):
-    """A convex body: the hull of points, or of the triangles of an STL file, with at most 200 faces.
+    """A convex body: the hull of points, or of the triangles of an STL file.
 
-    A file is read once, where the task is read: a saved task has its vertices.
+    A file is read once, where the task is read: a saved task has its vertices. What a distance costs grows with the
+    faces of the hull, of which there may be 200.
     """
 
     kind: Literal["mesh"]

@@ -21,7 +21,8 @@ MARK = b"\xef\xbb\xbf"  # with which some editors begin a text in UTF-8
 def read_stl(path: Path) -> np.ndarray:
     """Return the corners of all triangles of a file, (n, 3, 3), in the file's unit, which STL does not state.
 
-    Raises `InputError` that names the file if it cannot be read, is cut off, or has no finite triangles.
+    Raises `InputError` if it cannot be read, is cut off or has no triangles, or coordinates that are not finite;
+    one line that names the file.
     """
     where, content = printable(path.name), read_bytes(path, "an STL file", LARGEST_FILE)
     count = int.from_bytes(content[HEADER - 4 : HEADER], "little") if len(content) >= HEADER else 0

@@ -53,9 +53,12 @@ class _Value(NamedTuple):
 
 
 def to_c_function(function: ca.Function, name: str) -> str:
-    """Return C text of `static void NAME(inputs, outputs)`, matrices row by row, of an SX Function with dense ones.
+    """Return C text of `static void NAME(inputs, outputs)`, matrices row by row.
 
-    Inputs and outputs become arrays of their names. Raises `InputError` for an operation that is not known here.
+    - `function`: an SX Function with dense inputs and outputs, which become arrays of their names.
+    - `name`: the name of the C function.
+
+    Raises `InputError` if the tape has an operation that is not known here.
     """
     inputs, outputs = function.name_in(), function.name_out()
     values, stores = _straight_line(function)

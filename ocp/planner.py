@@ -71,7 +71,8 @@ def plan(
             `Plan.infeasible_spans` the times without tensions, and `Plan.relaxations` suggests feasible variations: a
             duration, or looser limits.
 
-    Raises `InputError` if the task or the start is invalid or does not fit the robot.
+    Raises:
+        InputError: If the task or the start is invalid or does not fit the robot.
     """
     with heeding():
         return Planner(robot, task, initial, robust).plan(progress, start)
@@ -84,7 +85,8 @@ class Planner(Displayed):
         robot: As for `plan`.
         task, initial, robust: As for `plan`.
 
-    Raises `InputError` as `plan` does.
+    Raises:
+        InputError: As `plan` does.
     """
 
     def __init__(
@@ -111,8 +113,9 @@ class Planner(Displayed):
     def interrupted(self) -> Plan | None:
         """Return the audited best attempt of an interrupted call of `plan`, or None.
 
-        It is the best motion that met all constraints at its nodes, or was audited before; `feasible` is the result of
-        its audit, which runs on first access, so that the interrupt is not delayed.
+        The attempt is the best motion of the solver that met all constraints at its nodes, or one that was audited
+        before; `feasible` is the result of its audit. The audit runs on first access, so that the interrupt is not
+        delayed.
         """
         search = self._search
         plan = None if search is None else search.best_of_interrupted()
@@ -177,8 +180,9 @@ class Planner(Displayed):
             Plan: The plan, with the status that `plan` would return. If it is not feasible, the next call continues
                 from the previous feasible plan.
 
-        Raises `InputError` if there is no feasible plan yet, if the task has phases, exact waypoints or a path in the
-        frame of a carrier, or if an argument does not fit.
+        Raises:
+            InputError: If there is no feasible plan yet, if the task has phases, exact waypoints or a path in the frame
+                of a carrier, or if an argument does not fit.
         """
         check_progress(progress)
         if self._flown is None:

@@ -137,7 +137,8 @@ class PlanData(Displayed):
     def waypoint_distance(self) -> WaypointDistance | None:
         """Return the waypoint that the motion passes at the largest distance; None for a path without waypoints.
 
-        Straight legs round their points by up to `blend`, and in a tube the distance may be larger.
+        It is measured on the motion. Straight legs round their points by up to `blend`, and in a tube the distance may
+        be larger.
         """
         scenario, audit = self.scenario, self.audit
 
@@ -156,9 +157,10 @@ class PlanData(Displayed):
 
     @property
     def certificate(self) -> Certificate | None:
-        """Return the certificate with the largest shortfall, with its time and wind, in {G}; None for a feasible plan.
+        """Return the certificate with the largest shortfall, with its time and wind; None for a feasible plan.
 
-        It is also None if tensions exist throughout and only other limits are exceeded (`audit.excess`).
+        It is also None if tensions exist throughout and only other limits are exceeded (`audit.excess`). The direction
+        is in {G}; `wind` is set for a task with a box of winds.
         """
         return None if self.feasible else self.audit.certificate
 
@@ -168,10 +170,11 @@ class PlanData(Displayed):
 
     @property
     def relaxations(self) -> tuple[Relaxed, ...]:
-        """Return feasible variations of an infeasible task; may be empty. Those with the same plan apply only together.
+        """Return feasible variations of an infeasible task; may be empty.
 
-        They are computed on first use, which can take longer than the plan: a limited number of iterations of programs,
-        in the time that remains of `time_limit`.
+        Relaxations with the same plan apply only together. They are computed on first use, which can take longer than
+        the plan: programs with a limited number of iterations are solved for them, in the time that remains of
+        `time_limit`.
         """
         return tuple(self._offered.found)
 

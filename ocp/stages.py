@@ -68,8 +68,9 @@ def climb(search: Search, start: Deviation | None, last: tuple[Mesh, Deviation] 
 def _fixed_motion(search: Search) -> Plan:
     """Plan a task with free tensions only: each instant is a separate tension-distribution problem.
 
-    If only limits of tension rates or of forces at carriers are exceeded, the program searches for tensions that keep
-    them; if anything but the sum of squared tensions costs, such as an exceeded soft limit, for cheaper ones.
+    If only limits on tension rates or on the forces at carriers are exceeded, the program searches for tensions
+    that keep them. If anything other than the sum of squared tensions adds to the cost, such as an exceeded soft
+    limit, it also searches for cheaper ones.
     """
     start = time.perf_counter()
     audit = search.audit_motion(search.scenario, None)

@@ -86,9 +86,12 @@ class BatchSolution(Displayed):
         return {status: int(number) for status, number in zip(STATUSES, numbers, strict=True) if number}
 
     def solution(self, index: int | tuple[int, ...]) -> TensionSolution:
-        """Solve row `index`, a number or a tuple, again as a single problem, for its full `TensionSolution`.
+        """Solve one row again as a single problem, for its full `TensionSolution`.
 
-        The method is "active-set", or "soft-wrench" if `rho` was given. Raises `InputError` if the row is invalid.
+        The method is "active-set", or "soft-wrench" if `rho` was given; `index` is a number or a tuple.
+
+        Raises:
+            InputError: If the row is invalid; the message gives the reason.
         """
         accepted = f"index must pick one row of a batch of shape {self.code.shape}"
         try:
@@ -140,7 +143,8 @@ def solve_batch(
         backend: "lanes" as described above, or "c" for rows one by one with the method of `solve`: for tests, and for
             results equal to `solve` in every bit. None = "lanes".
 
-    Raises `InputError` if an argument has a wrong type or shape.
+    Raises:
+        InputError: If an argument has a wrong type or shape.
     """
     start = time.perf_counter()
     if threads is not None:

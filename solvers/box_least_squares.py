@@ -16,9 +16,14 @@ from numpy.typing import NDArray
 from ..base.tolerances import RANK
 from .problem import Array, TensionProblem
 
-_NOISE = 4e-15  # rounding of a gradient entry, relative to the sum of the absolute terms in it
-_STILL = 1e-5  # a cable whose column has a larger part than this along the residual, relative to both, is at a limit
-_NOTHING = 1e-20  # a residual that is shorter than this, relative to w, is rounding: no other number is so near to w
+# Rounding of a gradient entry, relative to the sum of the absolute terms in it.
+_NOISE = 4e-15
+
+# A cable whose column has a larger part than this along the residual, relative to both, is at a limit.
+_STILL = 1e-5
+
+# A residual that is shorter than this, relative to w, is rounding: no other number is so near to w.
+_NOTHING = 1e-20
 
 
 class Projection(NamedTuple):
@@ -34,11 +39,13 @@ class Projection(NamedTuple):
 def box_least_squares(M: Array, b: Array, lower: Array, upper: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Minimise |M x - b| over a box.
 
-    - `M`, `b`: matrix of any rank, shape (k, m), and right-hand side, shape (k,).
+    - `M`: matrix, shape (k, m), any rank.
+    - `b`: right-hand side, shape (k,).
     - `lower`, `upper`: limits, shape (m,), may be infinite or equal.
 
-    Returns a minimiser, shape (m,), exactly inside the limits, and the mask, shape (m,), of the variables that were
-    determined, whose columns are linearly independent. Where it is not unique, it is the first one reached.
+    Returns a minimiser, shape (m,), exactly inside the limits. Where it is not unique, the first one reached.
+    With it comes a mask, shape (m,), of the variables that the minimisation determined, whose columns are linearly
+    independent.
     """
     m = M.shape[1]
     norms = np.sqrt(np.einsum("ij,ij->j", M, M))

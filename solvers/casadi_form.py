@@ -1,4 +1,7 @@
-"""Tension distribution inside a CasADi expression: `casadi_function`. Nothing else in this package imports CasADi."""
+"""Tension distribution inside a CasADi expression: `casadi_function`.
+
+CasADi is imported here and nowhere else in this package.
+"""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -52,7 +55,8 @@ def casadi_function(
         Function with inputs A (n, m), w (n), t_min (m), t_max (m) and output t (m) [N]. Crossed limits or entries that
             are not finite numbers give nan.
 
-    Raises `InputError` if an argument is not what `TensionProblem` accepts.
+    Raises:
+        InputError: If an argument is not what `TensionProblem` accepts.
     """
     m, n = whole_number("m", m, 1, _MOST), whole_number("n", n, 1, _MOST)
     if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z]([A-Za-z0-9]|_(?!_))*", name):

@@ -103,9 +103,10 @@ class Certificate(Displayed):
         return self.binding.size == 0
 
     def verify(self, problem: TensionProblem) -> bool:
-        """Return whether this certificate proves a problem infeasible, from the problem's data and the direction alone.
+        """Check from the problem's data alone that this certificate proves it infeasible.
 
-        Support, demand and binding cables are computed again. If not, the problem may still be infeasible.
+        Only the direction is trusted; support, demand and binding cables are recomputed and compared. False means that
+        the certificate proves nothing; the problem may still be infeasible.
         """
         required("problem", problem, TensionProblem)
         if self.direction.shape != (problem.n,) or self.closest.shape != (problem.m,):
@@ -134,7 +135,8 @@ class Certificate(Displayed):
             up: The direction opposite to gravity in the frame of the wrench, shape (3,): a vertical force is then
                 marked "up" or "down". Default: none is marked.
 
-        Raises `InputError` if `up` is not three finite numbers.
+        Raises:
+            InputError: If `up` is not three finite numbers.
         """
         pull_only = " (the cables can pull only the other way)" if self.support < 0.0 and not self.singular else ""
         limits = [
@@ -240,7 +242,8 @@ def certificate_along(
 ) -> Certificate | None:
     """Return the certificate along a direction, shape (n,), of any length, or None if it proves nothing.
 
-    Its shortfall is a lower bound of the distance to the set, `closest` the nearest tensions of the projection.
+    Its shortfall is a lower bound of the distance to the available wrench set, and `closest` the nearest tensions that
+    the projection found.
     """
     closest = (projection or project(problem)).closest
     return _along(problem, direction / problem.row_scale, closest, any_length=True)
@@ -271,8 +274,9 @@ def _along(problem: TensionProblem, vector: Array, closest: Array, any_length: b
 def _support(problem: TensionProblem, direction: Array) -> tuple[float, float, Indices, Indices]:
     """Return support value along `direction` and a bound of its rounding [N], and the cables at t_max and at t_min.
 
-    A cable with a limit counts at any size, and so does its rounding. One without gives any amount, unless its pull is
-    rounding of its own wrench; a smaller pull that is none of its terms is in doubt, times the largest tension.
+    What a cable with a limit gives counts at any size, and so does the rounding of its pull. A cable without a limit
+    gives any amount, unless it pulls by less than the rounding of its own wrench: the support value is infinite. A
+    smaller pull that is no rounding of its terms is in doubt, times the largest tension that counts.
     """
     pull, terms = direction @ problem.A, np.abs(direction) @ np.abs(problem.A)
     limit = np.where(pull > 0.0, problem.t_max, problem.t_min)

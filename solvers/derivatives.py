@@ -52,8 +52,9 @@ def sensitivity(problem: TensionProblem, solution: TensionSolution) -> Array:
             cables are free. It is 0 in directions of w that the free cables cannot give: there the active set changes
             at once (where pieces meet), or no tensions exist (on the boundary of the available wrench set).
 
-    Raises `InputError` if an argument is something else, or the solution has no tensions or those of another number of
-    cables.
+    Raises:
+        InputError: If an argument is something else, or the solution has no tensions or those of another number of
+            cables.
     """
     tensions = required("solution", solution, TensionSolution).tensions
     if tensions is None:

@@ -29,10 +29,13 @@ _ERROR = 2.0**-73
 
 
 def exact_optimum(problem: TensionProblem, nearest: Array) -> Projection:
-    """Find the tensions of least cost inside their limits whose wrench is w, or the nearest to it, from `nearest` (m,).
+    """Find the tensions of least cost inside their limits whose wrench is w, or the nearest to it.
 
     The residual is that of the tensions before they are rounded. Where the wrench is not the nearest, rho is raised
     until its error falls no more.
+
+    - `problem`: the problem.
+    - `nearest`: tensions of the projection of w [N], (m,), to start from.
     """
     size = problem.weights @ (nearest - problem.t_ref) ** 2
     wrench = accepted_error(problem, nearest) / FEASIBILITY

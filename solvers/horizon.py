@@ -88,7 +88,8 @@ class Horizon(Displayed):
         converged, iterations: Success of the last solution, and the number of Newton matrices that it needed, without
             that of a cold start.
 
-    Raises `InputError` if a size is not a whole number in its range.
+    Raises:
+        InputError: If a size is not a whole number in its range.
     """
 
     def __init__(self, N: int, n: int, m: int, rows: int = 0):
@@ -142,7 +143,8 @@ class Horizon(Displayed):
         Args:
             states, controls: Of the reference, shapes (N + 1, n) and (N, m).
 
-        Raises `InputError` if an array has another shape.
+        Raises:
+            InputError: If an array has another shape.
         """
         N, n, m, _ = self._sizes
         given = []
@@ -160,7 +162,8 @@ class Horizon(Displayed):
             shifted: Begin with the last solution moved by one stage, for a controller that solves once per stage.
             warm: Begin with the last solution, or what is written into `states`, `controls` and `multipliers`.
 
-        Raises `InputError` if an argument is not a bool.
+        Raises:
+            InputError: If an argument is not a bool.
         """
         shifted, warm = flag("shifted", shifted), flag("warm", warm)
         beginning = SHIFTED if shifted else WARM if warm else COLD

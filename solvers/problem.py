@@ -46,7 +46,8 @@ class TensionProblem(Displayed):
             wherever newtons and newton metres are compared: in residuals, tolerances and certificates. It never changes
             which tensions are optimal. Default: 1 m.
 
-    Raises `InputError` if an argument has a wrong type, shape or value. The message is one line.
+    Raises:
+        InputError: If an argument has a wrong type, shape or value. The message is one line.
     """
 
     A: Array  # (n, m)
@@ -150,9 +151,10 @@ class TensionProblem(Displayed):
     def null_space(self) -> Array:
         """Return N, shape (m, m - rank): orthonormal columns that span the null space of A.
 
-        All tensions that give w are A^+ w + N lambda (`TensionSolution.lambda_`). N is in echelon form: the first cable
-        with an entry in a column has a positive one there, and none in later columns, so it is unique on every
-        computer. Singular values of S A below 1e-10 of the largest are treated as zero.
+        All tensions that give w, inside the limits or not, are A^+ w + N lambda; `TensionSolution.lambda_` is the
+        lambda of a solution. N is in echelon form: the first cable with an entry in a column has a positive one there,
+        and none in later columns. So it is unique, and the same on every computer. Singular values of S A below 1e-10
+        of the largest are treated as zero.
         """
         _, sigma, rows = np.linalg.svd(self.scaled_A)
         null = rows[int(np.count_nonzero(sigma > DOUBTFUL * sigma[0])) :].T  # in any basis

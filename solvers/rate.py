@@ -25,7 +25,8 @@ def limit_rate(problem: TensionProblem, previous: ArrayLike, rate_max: ArrayLike
         TensionProblem: The same problem; its limits are clipped to the range from previous - rate_max to
             previous + rate_max.
 
-    Raises `InputError` if an argument has a wrong type, shape or value.
+    Raises:
+        InputError: If an argument has a wrong type, shape or value.
     """
     required("problem", problem, TensionProblem)
     at, step = repeated("previous", previous, problem.m), repeated("rate_max", rate_max, problem.m)

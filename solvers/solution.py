@@ -121,9 +121,10 @@ class TensionSolution(Displayed):
 
     @property
     def lambda_(self) -> Array | None:
-        """Return lambda = N^T t [N], shape (m - rank,), with tensions = A^+ w + N lambda; None without tensions.
+        """Return lambda [N], shape (m - rank,), with tensions = A^+ w + N lambda; None without tensions.
 
-        N is `problem.null_space`; this holds for the tensions of any method.
+        N is `problem.null_space`, whose columns are orthonormal and orthogonal to A^+ w: lambda = N^T t, for the
+        tensions of any method.
         """
         return None if self.tensions is None else self.problem.null_space.T @ self.tensions
 

@@ -45,7 +45,8 @@ def solve(
         backend: For "qp", the name of an installed QP solver; default: "clarabel".
         **options: Options of the method, see `methods()[name].options`.
 
-    Raises `InputError` if the method, back end or option does not exist; the message lists the existing ones.
+    Raises:
+        InputError: If the method, back end or option does not exist; the message lists the existing ones.
     """
     start = perf_counter()
     # These few lines decide the time of a step: a constructor would add a tenth.

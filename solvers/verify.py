@@ -46,14 +46,16 @@ def verify(
 ) -> Verdict | None:
     """Judge a proposal of a method.
 
-    It is "optimal" if the tensions give w and, for a method of least squares, multipliers prove it. Otherwise a
-    certificate decides. If none exists, w is on or near the boundary of the available wrench set, and rounding has cost
-    an `exact` method its result: least squares in exact arithmetic are "optimal" too, and a method with another aim
-    proposes once more, for the cables that can still vary.
+    The status is "optimal" if the tensions give w and, for a method of least squares, if multipliers prove them
+    optimal. Otherwise a certificate decides it. If none exists, rounding has cost an `exact` method its answer: w is on
+    the boundary of the available wrench set, or near it. The least squares are then computed in exact arithmetic and
+    are "optimal" too; a method with another aim proposes once more, for the cables that can still vary.
 
-    - `form`, `tensions`: the form that the method got, and its proposal in tensions [N], (m,).
+    - `problem`, `form`: the problem, and the form of it that the method got.
+    - `method`, `proposal`, `tensions`: the method, its proposal, and that in tensions [N], (m,).
     - `exact`: the least squares [N], (m,), if the form is that of what is left to choose on the boundary; else None.
-    - `last`: False if another form is left to try: then None is returned for all that is not accepted.
+    - `last`: False if another form is left to try: then only what is accepted is judged, and None is returned
+      otherwise.
     """
     useful = tensions is not None and _gives_wrench(problem, tensions)
     if tensions is not None and useful and (not method.least_squares or form.is_optimal(tensions)):
@@ -87,8 +89,9 @@ def verify(
 def _face(problem: TensionProblem, form: StandardForm, exact: Array) -> TensionProblem | None:
     """Fix each cable that is at the same limit in every solution of A t = w; return None if none is left to choose.
 
-    On a face of the available wrench set their wrenches have a component along its normal. The others can be strictly
-    inside their limits, as some methods require. `exact` are some tensions that give w [N], (m,).
+    If w is on a face of the available wrench set, these are the cables whose wrench has a component along its normal.
+    The others can all be strictly inside their limits at once, as some methods require. `exact` are some tensions that
+    give w [N], (m,).
     """
     s = (exact - form.origin)[form.moving] / form.unit  # (k,)
     near = AT_LIMIT * max(1.0, np.abs(s).max(initial=0.0))

@@ -60,7 +60,8 @@ def boundary(
         cells: Cells along the longest edge of the box. The mesh is accurate to about half the size of a cell.
         attitude: (roll, pitch, yaw) [rad]; default: the attitude at home.
 
-    Raises `InputError` if an argument has a wrong type or value, or the box is flat.
+    Raises:
+        InputError: If an argument has a wrong type or value, or the box is flat.
     """
     robot = as_robot(robot)
     required("condition", condition, Condition)

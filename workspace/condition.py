@@ -56,13 +56,15 @@ class Condition(Part, ABC):
     def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         """Return whether the condition holds at each configuration (finite numbers), (n,) of bool.
 
-        Raises `InputError` if the condition does not apply to the robot.
+        Raises:
+            InputError: If the condition does not apply to the robot.
         """
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return a distance to fulfilment, (n,), zero exactly where it holds, in a unit of the condition's choice.
+        """Return a distance to fulfilment, (n,), zero exactly where the condition holds.
 
-        It decreases towards fulfilment, so that searches can follow it. Default: 1. Configurations must be finite.
+        It is in a unit of the condition's choice, and decreases towards fulfilment, so that searches can follow it. The
+        default is 1 where the condition does not hold. The configurations must be finite.
         """
         return np.where(self.holds(robot, places), 0.0, 1.0)
 
@@ -90,7 +92,8 @@ class Condition(Part, ABC):
 def condition_from(data: Any) -> Condition:
     """Create a condition from its data: a mapping as returned by `model_dump` or read from a file.
 
-    Raises `InputError` if `kind` is missing or unknown, or another key does not fit.
+    Raises:
+        InputError: If `kind` is missing or unknown, or another key does not fit.
     """
     if isinstance(data, Condition):
         return data
@@ -105,7 +108,8 @@ def condition_from(data: Any) -> Condition:
 def for_robots(condition: Condition, share: float | None) -> Condition:
     """Return a condition for a fraction of the uncertain robots, or unchanged if `share` is None.
 
-    Raises `InputError` if `share` is not between 0 and 1, or no part of the condition is about tension limits.
+    Raises `InputError` if `share` is not a number between 0 and 1, or no part of the condition is about tension
+    limits.
     """
     if share is None:
         return condition

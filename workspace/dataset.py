@@ -54,10 +54,13 @@ def dataset(
 
 
 def save(result: xr.Dataset, file: str | os.PathLike[str]) -> Path:
-    """Save a result of `sample` atomically: as NetCDF, or as a Zarr folder (extra `cluster`) if the path ends in .zarr.
+    """Save a result of `sample` atomically: as NetCDF, or as a Zarr folder if the path ends in .zarr.
 
-    Attributes of the run, such as its duration, are left out, so that equal results are equal NetCDF files. Raises
-    `InputError` if an argument has a wrong type, the file cannot be written, or is a Zarr folder that exists.
+    `xarray.load_dataset` reads the former, `xarray.open_zarr` the latter (extra `cluster`). Attributes of the run, such
+    as its duration, are left out, so that equal results are equal NetCDF files.
+
+    Raises `InputError` if an argument has a wrong type, the file cannot be written, or is a Zarr folder that exists
+    already.
     """
     import xarray as xr
 

@@ -120,9 +120,12 @@ class Domain(Displayed):
         return np.hstack(parts) if len(parts) > 1 else parts[0]
 
     def places(self, units: np.ndarray) -> tuple[Places, np.ndarray]:
-        """Map points of the unit cube, `units` (n, d), to configurations; also return where these exist, (n,) of bool.
+        """Map points of the unit cube to configurations.
 
-        Where three cables of these lengths do not meet, the pose is home.
+        `units`: (n, d), between 0 and 1.
+
+        Returns the configurations, and (n,) of bool: False where three cables of these lengths do not meet; the
+        pose there is home.
         """
         count, carriers = len(units), len(self.robot.carriers)
         values = np.empty((count, len(self.low)))

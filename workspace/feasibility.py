@@ -120,11 +120,16 @@ def too_few_cables(robot: Robot) -> str | None:
 
 
 class Tightened:
-    """Decide where a `share` of the robots has tensions inside their limits, all these robots at all places.
+    """Decide where a share of the robots has tensions inside their limits, all these robots at all places.
 
-    The limits are tightened by the tension spread, which depends on the tensions: first for those of the nominal robot,
-    then for those inside the tightened limits, and so on. A place is accepted if the tensions of one iteration keep
-    their own spread. With more cables than wrench `rows` that may miss a solution: the result is never too large.
+    The limits are tightened by the tension spread, which depends on the tensions, so iteratively: first for those of
+    the nominal robot, then for those inside the tightened limits, and so on. A configuration is accepted if the
+    tensions of one iteration keep their own spread from the limits. For a robot with more cables than needed the
+    iteration may miss a solution, so the result may be too small, but never too large.
+
+    - `robot`: with an uncertainty.
+    - `share`: of the robots, above 0 and below 1.
+    - `rows`: wrench rows that the cables give.
 
     Raises `InputError` if the robot has no uncertainty, or fewer cables than rows, or the share is none.
     """

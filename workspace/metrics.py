@@ -37,7 +37,9 @@ class Metric(NamedTuple):
 
 
 def metric_values(metric: str, robot: Robot, places: Places) -> np.ndarray:
-    """Return a metric at each of n configurations, (n,), in the unit `METRICS[metric].unit`; nan where none exists.
+    """Return a metric at each of n configurations, (n,), in the unit `METRICS[metric].unit`.
+
+    It is nan where tensions or a pose at rest are needed and do not exist.
 
     Raises `InputError` if an argument has a wrong type or value, or the metric does not apply to the robot.
     """

@@ -17,8 +17,11 @@ def nearest_feasible(
 ) -> np.ndarray | None:
     """Return the pose closest to `pose` at which a condition holds, to a few per cent of the distance, or None.
 
-    The search samples poses within `size` [m] and may miss a set that is thin or has several parts. Radians count
-    `Robot.length` metres. `pose` and the fixed `carriers` are (6,) and (c, 6) in {G} [m, rad].
+    The search samples poses and may miss a feasible set that is thin or has several parts. Distances are in metres,
+    with radians multiplied by `Robot.length`.
+
+    - `pose`, `carriers`: (6,) and (c, 6) in {G} [m, rad]. Carriers are fixed.
+    - `size`: search radius [m].
     """
     rng, free = np.random.default_rng(0), robot.dof_mask.astype(bool)
     unit = np.where(np.arange(6) < 3, 1.0, 1.0 / robot.length) * free

@@ -21,7 +21,8 @@ def draw(result: xr.Dataset, robot: AnyRobot | None = None) -> Figure:
         result: A result of `sample`.
         robot: The robot whose anchors are drawn as triangles (default: none).
 
-    Raises `InputError` if an argument has a wrong type, or the result is not one of `sample`.
+    Raises:
+        InputError: If an argument has a wrong type, or the result is not one of `sample`.
     """
     import xarray as xr
 

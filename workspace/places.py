@@ -29,7 +29,10 @@ class Places(Displayed):
     def at_home(cls, robot: Robot, pose: ArrayLike) -> Places:
         """Return the configurations of poses (n, 6) or (6,) in {G} [m, rad] with every carrier at home.
 
-        Without finite numbers no condition holds. Raises `InputError` if an argument has a wrong type or shape.
+        At a pose with a number that is not finite no condition holds.
+
+        Raises:
+            InputError: If an argument has a wrong type or shape.
         """
         home = required("robot", robot, Robot).carrier_home
         poses = np.atleast_2d(real_array("pose", pose).astype(float, copy=False))
@@ -41,7 +44,11 @@ class Places(Displayed):
         return len(self.pose)
 
     def only(self, rows: np.ndarray | slice) -> Places:
-        """Return the configurations of some rows: indices, flags (n,) or a slice; raise InputError for others."""
+        """Return the configurations of some rows: indices, flags (n,) or a slice.
+
+        Raises:
+            InputError: If `rows` are none of these.
+        """
         try:
             return Places(self.pose[rows], self.carriers[rows])
         except (IndexError, TypeError, ValueError):

@@ -52,9 +52,10 @@ class Region(Part):
 
 
 def surrounding_box(robot: Robot, carriers: dict[str, Box]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners of a box about home, anchors and the floor below, (3,) and (3,) [m]; carriers are in theirs.
+    """Return the corners of a box about home, anchors and the floor below, (3,) and (3,) [m].
 
     Locked coordinates stay at home. A platform that hangs from anchors near one another can be far below them.
+    Carriers are in the boxes of `carriers`, by name, or else at home.
     """
     corners = [robot.home_anchors, robot.home[None, :3]]
     if robot.floor is not None:

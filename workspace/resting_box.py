@@ -30,10 +30,13 @@ class RestingBox(NamedTuple):
 def resting_box(robot: Robot) -> RestingBox | None:
     """Return the largest box along the axes of {G} about home on whose grid of samples the platform can rest, or None.
 
-    All of it is above the floor and in the room of the robot's file. Carriers stay at home or, where cables keep their
-    lengths, move along with the platform as far as they reach. A first grid covers the surroundings of home and
-    anchors, a second one the box that the first has found; if the platform cannot rest at home, it is about the nearest
-    sample.
+    All of it is above the floor and in the room of the robot's file, with the body of the platform.
+    Carriers stay at home. Where cables keep their lengths, the carriers move along with the platform instead, and the
+    box is where their reach allows this.
+
+    A first grid covers the surroundings of home and anchors, a second one the box that the first has found. Between
+    samples nothing is checked. If the platform cannot rest at home, the box is about the nearest sample at which it
+    can.
     """
     if robot.fixed_lengths is not None:
         return _moved_along(robot)

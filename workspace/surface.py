@@ -73,9 +73,12 @@ class Surface(Displayed):
 def surface(dataset: xr.Dataset, robot: Robot, within: float = np.inf) -> Surface | None:
     """Return the surface of a dataset of `workspace.sample`; None if it has none.
 
-    It has none if it is flat, without usable counts or cells, with a cell above `within` [m], or with no cell of which
-    half is accepted. It encloses blocks of cells with enough samples, of which half are accepted, or any if attitudes
-    or carriers vary. Raises `InputError` if scikit-image is not installed.
+    It has none if it is flat, if it has no usable counts or cells, if a coordinate of a cell is above `within` [m], or
+    if no cell has at least half of its samples accepted.
+
+    Cells are joined into blocks that have enough samples. The surface encloses the blocks in which at least half of
+    the samples are accepted, or any sample if attitudes or carriers vary. Raises `InputError` if scikit-image is
+    not installed.
     """
     if not _has_counts(dataset, within):
         return None

@@ -7,13 +7,17 @@ from ..models.points import anchors, attachments
 
 
 def three_cable_pose(robot: Robot, attitude: np.ndarray, carriers: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Return positions in {G}, (n, 3) [m], of a platform on three cables of given lengths; nan where they do not meet.
+    """Return positions of a platform on three cables of given lengths at given attitudes.
 
     |A_i - P - R b_i| = l_i: P lies on spheres about A_i - R b_i with the radii l_i. Of the two points that three
-    spheres share it is the lower, along gravity. The anchors of the robot are points.
+    spheres share it is the lower, along gravity.
 
-    - `attitude`, `carriers`: (roll, pitch, yaw), (n, 3) [rad], and poses in {G}, (n, c, 6) [m, rad].
+    - `robot`: robot with three cables whose anchors are points.
+    - `attitude`: (roll, pitch, yaw) of the platform, (n, 3) [rad].
+    - `carriers`: poses in {G}, (n, c, 6) [m, rad].
     - `lengths`: (3,) for all configurations or (n, 3) [m].
+
+    Returns positions in {G}, (n, 3) [m]; nan where the cables do not meet.
     """
     turned = np.concatenate([np.zeros_like(attitude), attitude], axis=1)
     centres = anchors(robot, carriers) - attachments(robot, turned)  # (n, 3, 3)

@@ -16,7 +16,8 @@ Value = Any  # float, np.ndarray or a CasADi expression, in and out
 def tension(length: Value, rate: Value, unstrained: Value, stiffness: Value, damping: Value = 0.0) -> Value:
     """Return T [N] of l = `length` [m], dl/dt = `rate` [m/s], L0 = `unstrained` > 0 [m], E A = `stiffness` [N].
 
-    `damping` is C of the whole cable [N s/m]. T is never negative, whatever the damper of a shortening cable does.
+    `damping` is C of the whole cable [N s/m]. T is zero when slack, also where the damper outweighs the spring of a
+    shortening cable.
     """
     pull = stiffness * (length - unstrained) / unstrained + damping * rate
     return (pull + abs(pull)) / 2 * (length > unstrained)

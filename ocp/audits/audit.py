@@ -52,7 +52,8 @@ class Audit(Displayed):
     def drift(self) -> Drift | None:
         """Return the error of an open-loop simulation with the planned tensions, which takes as long as the audit.
 
-        None for robots that can follow any motion exactly, with loads, on the ground, and where no tensions exist.
+        None for robots that can follow any motion exactly, for motions with loads or on the ground, and where no
+        tensions exist.
         """
         return None if self.drifting is None else self.drifting()
 

@@ -19,6 +19,7 @@ from .instants import Instants
 
 START_TENSIONS = "initial.tensions"
 UNITS = "m", "m/s", "m/s^2"  # of a motion and its derivatives
+
 PATH_TOLERANCE = 1e-7  # [m, rad], of ends and waypoints
 END_TOLERANCE = 1e-6  # [m, m/s, m/s^2], of where carriers and platform start and end
 END_ACCELERATION_TOLERANCE = 1e-4  # [m/s^2, rad/s^2], of second differences

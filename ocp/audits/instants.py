@@ -65,7 +65,10 @@ class Instants(Displayed):
 
 
 def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray) -> Instants:
-    """Evaluate a motion at `times` (n,), or raise InputError if somewhere a cable has no length."""
+    """Evaluate a motion at `times` (n,).
+
+    Raises `InputError` if somewhere a cable has no length.
+    """
     motion, carriers = scenario.motion(times, deviation)
     _check_lengths(scenario, times, motion, carriers)
     A = scenario.dynamics.wrench_matrix(motion.pose, carriers.pose)

@@ -14,12 +14,13 @@ def within_motors(
 ) -> np.ndarray:
     """Return the tensions (n, m) [N] of a motion, within the force and power of motors wherever such exist.
 
-    A motor's limit is one of the tension: its force is the tension and what accelerates the winch, its power the
-    tension times a speed. Where none exist, they exceed it by little, if possible; elsewhere the tensions are the given
-    ones.
+    At each instant of a motion a motor's limit is one of the tension: its force is the tension and what accelerates the
+    winch, its power the tension times a speed. Where none exist, they exceed what motors can by little, if such exist;
+    at all other instants the tensions are the given ones.
 
-    - `A`, `case`: wrench matrices with moments over `Robot.length`, (n, 6, m); such wrenches, (n, 6), and tensions [N].
-    - `values`: what each limit bounds for these tensions, (n, k) each.
+    - `A`: Wrench matrices with moments over `Robot.length`, (n, 6, m).
+    - `case`: Wrenches with the same moments, (n, 6) [N], and their tensions so far, (n, m) [N].
+    - `values`: What each limit bounds for these tensions, (n, k) each.
     """
     w, tensions = case
     low, high = scenario.bounds_at(times)

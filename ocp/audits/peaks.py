@@ -121,8 +121,9 @@ def _may_exceed(
 def _may_be_short(seen: Instants, jumps: np.ndarray) -> np.ndarray:
     """Return between which instants there may be no tensions inside their limits, (n - 1,).
 
-    Tensions between those of two instants are inside, as limits are convex. What their wrench misses is bounded by its
-    curvature; it is nothing if cables can make up for it. If not, other tensions, far from their limits, may.
+    Tensions between those of two instants are inside their limits, since these are convex. What their wrench misses is
+    bounded by its curvature, and is nothing if it is small, or if all cables together can make up for it from what they
+    have left to their limits. Where they have not, other tensions of the same instants, far from their limits, may.
     """
     resting = seen.scenario.phases.resting(seen.times)
     doubtful = ~(resting[1:] & resting[:-1]) & ~jumps

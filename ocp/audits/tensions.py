@@ -144,8 +144,9 @@ class Distribution:
 def few_and_inverse(A: np.ndarray, dof: int) -> tuple[bool, np.ndarray]:
     """Return whether some matrix of A (n, 6, m) has fewer than `dof` independent columns, and the inverses (n, m, 6).
 
-    A decomposition of each would take longest of an audit: those far from losing a row by their Frobenius norm need
-    none. One step of Newton's method (Schulz 1933) brings back what the inverse by A A^T has lost.
+    Nothing else in an audit takes as long as a decomposition of each matrix. Those that are far from losing a row by
+    their condition in the Frobenius norm, which is never less than that of the singular values, need none. The inverse
+    by A A^T has lost the square of the condition, and one step of Newton's method (Schulz 1933) brings that back.
     """
     if A.shape[1] == dof <= A.shape[2]:
         transposed = A.swapaxes(1, 2)
@@ -166,8 +167,9 @@ def in_all_winds(
 ) -> AuditedTensions:
     """Return the result of the worst wind of a set at each instant, whose certificate has its wind.
 
-    `middle` is that of the planned tensions for w (n, 6), the wrench in the set's middle. If the winds that decide
-    pass, others are tried only to check that. A certificate is one of a wind of the set, which these need not be.
+    `middle` is the result of the planned tensions for w (n, 6), the wrench in the set's middle. At no wind is the
+    wrench farther from the available ones than at those that decide: if these pass, others are tried only to check
+    that. A certificate is one of a wind of the set, which those that decide need not be.
     """
     scenario = distribute.scenario
     without_air = w + scenario.dynamics.aerodynamic_wrench(motion.pose, motion.velocity, np.array(every.middle))

@@ -9,9 +9,10 @@ from .excess import Excess
 
 
 def relative_violation(scenario: Scenario, audit: Audit) -> float:
-    """Return the largest violation relative to its limit: zero if the audit passed, infinite for an undefined value.
+    """Return the largest violation of any limit, relative to that limit; zero if the audit passed.
 
-    Missing wrenches, and excesses over limits of zero, are relative to `Robot.force_scale` or `Robot.length`.
+    A missing wrench is relative to `Robot.force_scale`. An excess over a limit of zero is relative to the same force or
+    to `Robot.length`, by its unit. A value that is undefined is an infinite violation.
     """
     if audit.passed:
         return 0.0

@@ -74,7 +74,8 @@ class Costs(Displayed):
     ) -> float:
         """Return the objective of a motion in {G} that has no free coordinates, at `times` (n,) [s] from 0.
 
-        Its parts are (n, 6) and (n, c, 6), tensions (n, m) [N]; `margin` is as in `CostState` [N].
+        Poses, velocities and accelerations are (n, 6) and (n, c, 6) each, tensions (n, m) [N]; `margin` is the least
+        distance of these from their limits, beyond the task's `margin` [N].
         """
         still = [np.zeros((len(times), 18))] * (1 + len(self.robot.carriers))
         whole = np.full((len(times), 1), times[-1]), np.full((len(times), 1), margin)

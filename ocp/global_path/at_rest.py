@@ -29,9 +29,10 @@ class Kept(NamedTuple):
 
 
 class AtRest:
-    """Evaluate the hard limits of a scenario, and with `balance` whether there are tensions, at rest.
+    """Evaluate the hard limits of a scenario, and whether there are tensions, for platform and carriers at rest.
 
-    Limits of other units than metres are kept or not: their slack is in parts of the robot's size.
+    Limits of other units than metres are kept or not: their slack is in parts of the robot's size. Without `balance`
+    it does not matter whether there are tensions.
     """
 
     def __init__(self, scenario: Scenario, size: float, spare: float = SPARE, balance: bool = True):
@@ -155,7 +156,8 @@ class AtRest:
 def unsure(slack: np.ndarray, points: np.ndarray, slope: float = 1.0) -> np.ndarray:
     """Return the indices k of poses between which and the next a limit may be exceeded, though both keep it.
 
-    `slack` (n,) [m] changes by at most `slope` times what any of `points` (n, k, 3) moves; `FINEST` is none.
+    `slack` (n,) [m] changes by at most `slope` times what any of `points` (n, k, 3) moves. Where they move less than
+    a millimetre nothing is unsure.
     """
     moved = np.linalg.norm(np.diff(points, axis=0), axis=2).max(axis=1, initial=0.0)
     return np.flatnonzero((slack[1:] + slack[:-1] < slope * moved) & (moved > FINEST))

@@ -25,8 +25,9 @@ NARROW = 0.03  # of the robot's size: gaps much narrower do not count for more
 
 
 class ClearSpace:
-    """The configurations whose slack is the `reserve` [m] or more; near an end that has less, as much as it can be.
+    """The configurations whose slack is the reserve or more; near an end that has less, as much as can be kept there.
 
+    - `reserve`: by how much all limits are kept [m].
     - `evaluated`, `most`: how many configurations have been evaluated, and how many are in a search.
     - `deadline`: when a search ends, by `time.perf_counter` [s].
     """

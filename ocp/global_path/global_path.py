@@ -103,7 +103,8 @@ def find_global_path(
 ) -> tuple[GlobalPath | None, str]:
     """Return a path, or None, and a message: its length, or why there is none.
 
-    It is always the same if `seconds` suffice. At `most` so many configurations are evaluated with each reserve.
+    The same scenario has the same path, unless the time of `seconds` ends first. At `most` so many configurations are
+    evaluated with each reserve; default: as many as a plan deserves.
     """
     space, deadline = Space(scenario), time.perf_counter() + seconds
     rest = AtRest(scenario, space.size)
@@ -273,7 +274,9 @@ def _clear_end(
 def motion_past(search: Search, balance: bool) -> tuple[Deviation | None, bool]:
     """Return a motion past what the usual guess collides with, or the best guess, and whether it collides at all.
 
-    None is the usual guess. With `balance` a configuration without tensions at rest is a collision.
+    None is the usual guess where no formation is better.
+
+    With `balance` a configuration without tensions at rest is a collision.
     """
     scenario = search.scenario
     if scenario.count == 0 or not is_open(scenario):

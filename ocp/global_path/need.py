@@ -37,9 +37,10 @@ def is_open(scenario: Scenario) -> bool:
 
 
 def guess_exceeds(scenario: Scenario, guess_at: Callable[[np.ndarray], Deviation], balance: bool = True) -> str:
-    """Return the name of the limit that a guess exceeds at rest, at any time, "tensions", or "" if it keeps all.
+    """Return the name of the limit that a guess exceeds at rest, "tensions", or "" if it keeps all.
 
-    `guess_at` returns the guess at times (n,) [s]. Without `balance` there need not be tensions.
+    Between the configurations that are checked no distance is exceeded either. `guess_at` returns the guess at times
+    (n,) [s]. Without `balance` there need not be tensions.
     """
     times = np.linspace(0.0, scenario.duration, PLACES)
     guess, rest = guess_at(times), AtRest(scenario, 1.0, spare=0.0, balance=balance)

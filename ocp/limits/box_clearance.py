@@ -34,8 +34,9 @@ def segment_outside_box() -> ca.Function:
 def _beyond_at_nearest(low: Point, high: Point, p: Point, p_end: Point) -> Point:
     """Return how far the point of a segment that is nearest to a box is beyond it along each axis, (3, 1) [m].
 
-    The squared distance is convex, with kinks of its slope where the segment crosses the plane of a face. Between the
-    last at which it falls and the first at which it rises the same faces count, so the least is at a quotient.
+    The squared distance along the segment is convex, and its slope is piecewise linear with a kink where the segment
+    crosses the plane of a face. Between the last kink at which it falls and the first at which it rises the same faces
+    count, so that the place where it is least is a quotient.
     """
     along = p_end - p
     fixed = along == 0

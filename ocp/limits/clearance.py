@@ -25,7 +25,10 @@ def between_points(p: Point, q: Point) -> Any:
 
 
 def between_cables(p: Point, p_end: Point, q: Point, q_end: Point) -> Any:
-    """Return the distance of two segments [m]. Source: Ericson, Real-Time Collision Detection, 5.1.9."""
+    """Return the distance of the segments p to p_end and q to q_end [m].
+
+    Source: Ericson, Real-Time Collision Detection, 5.1.9.
+    """
     along, across, between = p_end - p, q_end - q, p - q
     f, b, c = ca.dot(across, between), ca.dot(along, across), ca.dot(along, between)
     # Of a segment without length, such as the way of a platform at rest, any point will do.

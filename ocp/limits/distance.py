@@ -17,10 +17,11 @@ class Pair(NamedTuple):
 
 
 class Distance(Limit):
-    """A limit of the distance of each of some pairs of bodies, which have the same numbers of points.
+    """A limit of the distance of each of some pairs of bodies.
 
-    A plane between two convex bodies proves a lower bound of their distance, and one with the same normal does so at
-    any other time, from the points alone: so the audit can bound the distance between two instants.
+    A plane between two convex bodies proves a lower bound of their distance. A plane with the same normal does so at
+    any other time, from the points alone, so the audit can bound the distance between two instants. All pairs
+    of a limit have the same numbers of points.
     """
 
     unit = "m"

@@ -93,7 +93,8 @@ class Limit(ABC):
     def on_the_way(self, first: State, second: State) -> ca.SX | None:
         """Return the smallest values while all points move straight from one instant to another, (k, 1).
 
-        The program limits these values where a step may jump over a region. Default: none, so it limits its nodes.
+        The program limits these values where a step may jump over a region. By default there are none, and it limits
+        those at its nodes.
         """
         return None
 
@@ -174,8 +175,9 @@ class Limit(ABC):
 class Magnitude(Limit):
     """A limit of the length of a vector: `values` are its components, `high` bounds their root sum square.
 
-    A norm has a corner at zero, where a motion rests. At nodes a small square is added under the root, and to the
-    square of the bound as well; on Bernstein points the square is limited, which has no corner.
+    A norm has a corner at zero, where a motion rests. At the nodes of a program the root is therefore taken of the sum
+    plus a small square, which is added to the square of the bound as well. On Bernstein points the square is limited,
+    which has no corner.
     """
 
     def __init__(self, most: float):

@@ -55,8 +55,9 @@ class Durations(NamedTuple):
 def durations(scenario: Scenario) -> Durations | None:
     """Return the durations that are possible at `PLACES` points of the path; None if this method does not apply.
 
-    It does not if anything but the duration is free, a path has times of its own, there is wind, the ground bears
-    something, or the cables have fewer independent columns than the platform has degrees of freedom.
+    It does not if anything but the duration is free, a path has times of its own, the drag depends on the speed
+    in another way, the ground bears something, or the cables have fewer independent columns than the platform has
+    degrees of freedom.
     """
     if scenario.count or scenario.task.wind is not None or scenario.phases.rest or not scenario.stretches:
         return None

@@ -26,7 +26,8 @@ def out_of_reach(
 ) -> Certificate | None:
     """Return the certificate of the worst of some instants at which the platform is given; None if there is none.
 
-    - `times`: the instants, (n,) [s], not on the ground; `platform`, `carriers`: motions, (n, 6), (n, c, 6) each.
+    - `times`: the instants, (n,) [s], none of them on the ground.
+    - `platform`, `carriers`: motions there in {G}, (n, 6) and (n, c, 6) each.
     - `free`: whether each carrier may be elsewhere, in its reach box or, without one, anywhere, (n, c).
     """
     robot, corners = scenario.robot, []

@@ -67,8 +67,9 @@ def _too_short(
 ) -> Iterator[Excess]:
     """Yield a duration that is too short for all cables together to accelerate the platform's CoM and stop it again.
 
-    The acceleration is, at some time, at least four times distance over square of the duration. Cables give at most
-    t_max each, flying carriers their thrusts, and the weight its own magnitude.
+    The acceleration at some time is at least four times the distance divided by the square of the duration, along the
+    way or against it. No cable gives more than its largest tension, flying carriers no more than their thrusts, and the
+    weight contributes at most its own magnitude.
     """
     robot = scenario.robot
     if not still or scenario.wind is not None or scenario.phases.all:

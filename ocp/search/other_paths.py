@@ -120,7 +120,8 @@ def shifted_path(scenario: Scenario, shortest: np.ndarray | None) -> Change | No
 def other_yaws(scenario: Scenario) -> Change | None:
     """Return the change of the yaws at the points of the path at which no tensions hold the platform at rest.
 
-    Each is as near to the given one as tensions permit, on the way to that with the largest margin, or one factor less.
+    Each lies between the given yaw and the one with the largest capacity margin there, as near to the given one as
+    tensions at rest permit, or by one factor less.
     """
     path, robot = scenario.task.path, scenario.robot
     if not isinstance(path, LinePath | WaypointPath) or scenario.relative or not robot.dof_mask[5]:

@@ -181,7 +181,8 @@ def _clear_points(scenario: Scenario, points: np.ndarray) -> dict[int, np.ndarra
 def _nearest(kept: AtRest, pose: np.ndarray, carriers: np.ndarray, beside: np.ndarray) -> np.ndarray | None:
     """Return the position nearest to that of a pose, along an axis of {G}, at which the robot can rest, or None.
 
-    One with clear lines to positions `beside` it (k, 3) is preferred, unless the planner may leave the line so far.
+    The nearest from which the lines to positions `beside` it (k, 3) are clear is preferred, unless the planner may
+    leave the line by the shift.
     """
     scenario, start = kept.scenario, pose[:3]
     size = float(np.linalg.norm(np.ptp(np.vstack([scenario.robot.home_anchors, start, beside]), axis=0)))

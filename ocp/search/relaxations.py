@@ -131,8 +131,9 @@ def _other_limits(
 ) -> list[Relaxed]:
     """Return looser bounds for all limits that a motion exceeds; with all of these changes together its audit passes.
 
-    They are looser than necessary by `beyond` of their change. The list is empty if the motion exceeds what a task
-    cannot loosen: tension limits, limits of the robot's file, the ends of the motion, the inside of an obstacle.
+    They are looser than the motion needs by `beyond` of their change.
+    The list is empty if the motion exceeds what a task cannot loosen: tension limits, limits of the robot's file, the
+    ends of the motion, the inside of an obstacle.
     """
     given, changes = scenario.task.model_dump(), dict[str, Bound]()
     least = scenario.hard_margin
@@ -243,7 +244,8 @@ def _lasting(search: Search, seconds: float) -> Plan | None:
 def planned(search: Search, scenario: Scenario, name: str, guess: Deviation | None = None) -> Plan | None:
     """Return a feasible plan of another scenario, whose audit is a stage with a `name`; None if none is found.
 
-    Without free coordinates it is the motion itself, else the refined solution, unless that is proven infeasible.
+    Without free coordinates it is the motion itself, else the solution of the program, refined as that of any task,
+    unless the scenario is proven infeasible.
     """
     if not scenario.count:
         audit = search.audit_motion(scenario, None, name)

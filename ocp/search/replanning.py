@@ -120,10 +120,11 @@ def final_of(plan: Plan) -> Final | None:
 def remainder(
     whole: Scenario, final: Final | None, last: Plan, begun: float, time: float, initial: Initial, settle: float
 ) -> tuple[Scenario, Deviation | None]:
-    """Lay out the rest of the motion of `whole` from `time` [s] on, for a robot in the state `initial`, to `final`.
+    """Lay out the rest of the motion of `whole` from `time` [s] on, for a robot in the state `initial`.
 
-    `last` is the plan that the robot followed, which `begun` at that time [s]. The way back to the path takes `settle`
-    [s] at most. The second result is a guess: the last plan, with deviations decaying; None if the motion is fixed.
+    `final` is how it ends, beside what its task requires, and `last` the plan that the robot followed, which `begun` at
+    that time [s]. The way back to the path takes `settle` [s] at most. The second result is the last plan, with the
+    carriers' deviations from it decaying; None if the task fixes the motion.
     """
     left = whole.duration - time
     at = np.array([time - begun])
@@ -154,7 +155,11 @@ def remainder(
 
 
 def _completed(initial: Initial, last: Plan, at: np.ndarray, carriers: Motion) -> Initial:
-    """Return the state with carriers and, for agile robots, tensions as planned, if they were not measured."""
+    """Return the state with carriers and tensions as planned, if they were not measured.
+
+    Not the tensions of robots with few cables or fixed lengths, whose balance has hardly any others than those that the
+    program computes.
+    """
     fields: dict[str, Any] = {}
     if initial.carrier_pose is None:
         fields["carrier_pose"], fields["carrier_velocity"] = (_rows(part[0]) for part in carriers[:2])

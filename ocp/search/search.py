@@ -51,9 +51,9 @@ ENDS = {  # of a run of the solver, by its message; others are quoted
 class Search:
     """Solve one scenario's programs, and record the time and the message of each stage.
 
-    New `solvers` are added to those that exist, by mesh. `progress` gets (iteration, objective, infeasibility). All
-    takes `seconds`; default: the task's time limit, less the last audit; each run of a solver at most
-    `most_iterations`.
+    New `solvers` are added to those that exist already, by mesh. `progress` is called with (iteration, objective,
+    infeasibility). All that the search does takes `seconds`, from now on; default: the task's time limit, less what the
+    last audit takes. Each run of a solver takes at most `most_iterations`.
     """
 
     def __init__(
@@ -129,7 +129,8 @@ class Search:
     ) -> Outcome:
         """Solve the program of `mesh` from `guess`; default: from its last solution, or else from a guess of its own.
 
-        A guess is `coarser` if it is an optimum on a coarser mesh, and `clear` if it is past all that is in the way.
+        A guess is `coarser` if it is the same task's optimum on a coarser mesh, and `clear` if it is past all regions
+        that are in the way, as such an optimum is.
         """
         with self.stage(f"{name}, {mesh.steps} steps") as stage:
             if self.seconds_left <= 0:
@@ -181,9 +182,10 @@ class Search:
         return outcome
 
     def approach(self, mesh: Mesh, guess: Deviation | None, scenario: Scenario | None = None) -> Deviation | None:
-        """Return a motion past the regions in the way, from which the program of `mesh` soon ends, or None.
+        """Return a motion past the regions that are in the way, from which the program of `mesh` soon ends, or None.
 
-        It is one of `scenario` (default: the search's), from passes with linear distances, each about the one before.
+        It results from passes with linear distances, each about the motion of the one before. The motion is one of
+        `scenario`; default: of the search's own.
         """
         slower = "" if scenario is None else f", motion of {quantity(scenario.duration, 's')}"
         scenario = scenario or self.scenario

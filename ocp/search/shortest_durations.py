@@ -43,9 +43,11 @@ class Chosen(NamedTuple):
 
 
 def shortest_durations(scenario: Scenario) -> tuple[Scenario, Chosen | None]:
-    """Return the scenario with numbers for the ranges of its phases or dwelling path, and the stage that chose them.
+    """Return the scenario with numbers for the ranges of its phases, or for that of a path that dwells.
 
-    Any other scenario is returned as it is, with None. Raises `InputError` for a range in a phase with free motion.
+    Also return the stage that chose them; None for any other scenario, which is returned as it is.
+
+    Raises `InputError` if a phase has a range although tube or base leave the motion free.
     """
     span = scenario.duration_range
     if span is not None and scenario.path.resting and not scenario.count:

@@ -81,8 +81,9 @@ def near_chosen_motion(search: Search, scenario: Scenario, deviation: Deviation 
 def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
     """Return feasible variations of what a task does not name: where its path is, the platform's mass, t_max, t_min.
 
-    `audit` is that of the motion exactly on the path. Each variation is one change; if there is none, it is a path of
-    the same form near home, or else several changes together. The list is empty for uncertain robots.
+    `audit` is that of the motion exactly on the path. Each variation is one change. If there is none, it is a path of
+    the same form near the platform's home, or else several changes together, such as fewer regions. The list is empty
+    for uncertain robots.
     """
     task = scenario.task
     if task.robust is not None:

@@ -63,7 +63,8 @@ class Axis(Displayed):
 def read_axes(vary: object) -> tuple[Axis, ...]:
     """Return the axes of a mapping from dotted keys to values.
 
-    Raises `InputError` if it is none, a value appears twice, a key is inside another, or there are too many plans.
+    Raises `InputError` if it is anything else, a value appears twice, a key lies inside another one, or there are
+    too many plans.
     """
     if not isinstance(vary, Mapping) or not vary:
         accepted = "a mapping from dotted keys of a task file to lists of values"
@@ -114,10 +115,11 @@ class _Values(Part):
 
 
 def read_option(options: Sequence[str]) -> dict[str, list[Any]]:
-    """Read texts such as "margin=0:20:5" as keys with their values, separated by commas.
+    """Read texts such as "margin=0:20:5" as keys with their values.
 
-    Each is a range start:stop:step, with the stop if the steps meet it, or what a task file could have there: a number,
-    a word, [a, list] or {a: mapping}. Raises `InputError` for another form, or a key that appears twice.
+    Values are separated by commas. Each is a range start:stop:step, with the stop if the steps meet it, or what a
+    task file could have there: a number, a word, [a, list] or {a: mapping}. Raises `InputError` if a text has
+    another form, or a key appears twice.
     """
     vary: dict[str, list[Any]] = {}
     for option in options:
@@ -154,7 +156,10 @@ def _expanded(key: str, value: Any) -> list[Any]:
 
 
 def check_figure(axes: Sequence[Axis]) -> None:
-    """Raise InputError if a figure cannot show so many varied fields, or values of the third."""
+    """Check that a figure can show all varied fields.
+
+    Raises `InputError` if there are too many, or too many values of the third.
+    """
     if len(axes) > MOST_AXES:
         raise InputError(f"a figure must be of at most {MOST_AXES} varied fields, got {len(axes)}")
     if len(axes) == MOST_AXES and len(axes[-1].values) > MOST_COLUMNS:
@@ -174,7 +179,10 @@ class Field(Displayed):
 
     @classmethod
     def of(cls, key: object) -> Field:
-        """Return the field of a key, or raise InputError if it is no dotted key."""
+        """Return the field of a key.
+
+        Raises `InputError` if it is no dotted key.
+        """
         if not isinstance(key, str) or not _KEY.fullmatch(key):
             accepted = "dotted keys of a task file, such as tube.position"
             raise InputError(f"vary must have {accepted}, got the key {shown(key)}")
@@ -208,7 +216,10 @@ class Field(Displayed):
         return other.steps[: len(self.steps)] == self.steps and other.of_robot == self.of_robot
 
     def set(self, data: Any, value: Any) -> Any:
-        """Return data of a task or robot with another value of this field, or raise InputError if it is not there."""
+        """Return data of a task or robot with another value of this field.
+
+        Raises `InputError` if the data have no such place.
+        """
         return self._set(data, self.steps, value, ())
 
     def _set(self, data: Any, left: tuple[str | int, ...], value: Any, done: tuple[str | int, ...]) -> Any:

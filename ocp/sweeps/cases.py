@@ -88,9 +88,10 @@ class Cases:
         return self._robots[place] if parts else robot
 
     def check(self) -> None:
-        """Check every combination, or raise InputError for the first one that is wrong, with its values.
+        """Check every combination: whether the values are valid and the task fits the robot.
 
-        If whole robots or tasks vary, one of the tasks has to fit its robot: others are rows with the status `failed`.
+        Raises `InputError` for the first one that is wrong, with its values. If whole robots or tasks vary, it is
+        enough that one of the tasks fits its robot: the other combinations are rows with the status `failed`.
         """
         wrong: list[InputError] = []
         for number in range(len(self)):

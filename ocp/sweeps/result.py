@@ -132,7 +132,8 @@ class Sweep(Reported, Displayed):
     def save(self, file: str | os.PathLike[str]) -> tuple[Path, Path]:
         """Save the table as NetCDF, and as CSV with the suffix .csv; return both paths.
 
-        Raises `InputError` if a file cannot be written, or `file` ends in .csv (reserved for the second file).
+        Raises:
+            InputError: If a file cannot be written, or `file` ends in .csv (reserved for the second file).
         """
         path = file_path("file", file)
         beside = path.with_suffix(".csv")
@@ -176,10 +177,11 @@ class Sweep(Reported, Displayed):
         }
 
     def figure(self) -> Figure:
-        """Draw cost, margin and, unless varied, duration over one field as curves, two as maps, three as several maps.
+        """Draw cost, margin and, unless it is varied, duration over the varied fields.
 
-        Plans that are not feasible are marked. Raises `InputError` for more fields, or more than six values of the
-        third.
+        One field: curves. Two: maps. Three: maps for each value of the third. Plans that are not feasible are marked.
+
+        Raises `InputError` if there are more than three fields, or more than six values of the third.
         """
         from ...figures.sweep import Axis, sweep
 

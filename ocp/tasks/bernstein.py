@@ -50,7 +50,8 @@ def value(points: Sequence[Values], share: float) -> Values:
 def joined(h: Values, points: Sequence[Values], speed: Values, end: Values, end_speed: Values) -> list[Values]:
     """Return the points of a position whose last two follow from its end, not from integration over the whole interval.
 
-    In a program they depend on fewer unknowns, and the limits at both sides of a node are the same ones.
+    On a motion they are the same; in a program they depend on fewer unknowns, and the limits at both sides of a node
+    are the same ones.
     """
     degree = len(points) - 1
     if degree < 3:

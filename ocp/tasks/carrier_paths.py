@@ -9,7 +9,8 @@ from .task import GivenBase, HoldBase, Task
 def carrier_paths(robot: Robot, task: Task) -> dict[int, AnyPath]:
     """Return the carriers' reference paths by the index of the carrier; the others stay at home.
 
-    Raises `InputError` for an unknown name, that of a carrier that never moves, or a path that is not in {G}.
+    Raises `InputError` if a name is unknown or that of a carrier that never moves, or if a path is not given in
+    {G}.
     """
     base = task.base
     if isinstance(base, HoldBase):

@@ -23,10 +23,12 @@ OF_LIMITS = {"limits", "margin", "base", "phases", "tube"}  # the fields of a ta
 def lay_out(
     robot: Robot, task: Task, initial: Initial | Measured | dict[str, Any] | None = None, limits: Limits | None = None
 ) -> Scenario:
-    """Lay `task` out, or raise InputError for what does not fit `robot`: the field, its value and what is accepted.
+    """Check that `task` fits `robot` and lay it out.
 
     `initial`: the state from which the motion starts, instead of the task's (`initial_of`). `limits`: those of a task
     with the same `OF_LIMITS`, whose functions are built already.
+
+    Raises `InputError` naming the field of the task that does not fit, its value and the accepted values.
     """
     check_task(robot, task)
     task = with_timing(robot, task)

@@ -42,8 +42,9 @@ class Load(RigidLoad):
     def extremes(self) -> np.ndarray:
         """Return the loads that decide whether tensions exist for all within the tolerances, (k, 10); k is 0 without.
 
-        A wrench is affine in mass and CoM if the inertia about the nominal CoM is in proportion to the mass: it is a
-        weighted mean of the corners' wrenches, and the set of available ones is convex.
+        The wrench of a load is affine in its mass, and in its CoM, if its inertia about the nominal CoM is in
+        proportion to the mass. So each wrench is a weighted mean of the corners' wrenches, and the set of available
+        ones is convex.
         """
         masses = np.unique([self.mass * (1 - self.mass_tolerance), self.mass * (1 + self.mass_tolerance)])
         offsets = list(product(*(np.unique([-off, off]) + 0.0 for off in self.com_tolerance)))
@@ -83,7 +84,8 @@ class Phase(Part):
 def path_of(phases: Sequence[Phase]) -> SequencePath:
     """Return the paths of phases as a sequence.
 
-    Raises `ValueError` that names a path that is missing, has no duration, or begins not where the one before ends.
+    Raises `ValueError` if a path is missing, does not begin where the one before ends, or has no duration; one line
+    that names it.
     """
     joined: list[tuple[SinglePath, float]] = []
     for index, phase in enumerate(phases):

@@ -48,9 +48,10 @@ def end_tensions(scenario: Scenario, phase: LaidPhase, end: int) -> np.ndarray |
 
 
 def known_tensions(scenario: Scenario, phase: LaidPhase, end: int) -> np.ndarray | None:
-    """Return the tensions (m,) [N] with which a task starts (0) or ends (-1) on the ground; None if they are chosen.
+    """Return the tensions with which a task starts (0) or ends (-1) on the ground, (m,) [N].
 
-    Where carriers may be anywhere only slack cables are known: none has to pull if the ground bears it all.
+    They are None if the planner chooses them. Where carriers may be anywhere they are known only of slack cables: none
+    has to pull if the ground bears it all.
     """
     if not scenario.carrier_free:
         return end_tensions(scenario, phase, -end)
@@ -71,7 +72,8 @@ def largest_support(scenario: Scenario, w: np.ndarray, high: np.ndarray) -> floa
 def support_forces(scenario: Scenario, columns: np.ndarray, wrenches: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return support forces n >= 0, (k, s) [N], whose wrenches S n are nearest to `wrenches` (k, 6), and the distances.
 
-    The distances, (k,) [N], have moments over `Robot.length`; the forces are of least norm if that has none below 0.
+    The distances, (k,) [N], have moments over `Robot.length`. Of several the forces have the least norm, where no
+    force of that is negative.
     """
     scale = scenario.robot.dof_mask * scenario.robot.wrench_scale
     S, targets = columns * scale[:, None], wrenches * scale

@@ -311,7 +311,8 @@ class Scenario(Displayed):
 def in_world(dynamics: Dynamics, relative: bool, platform: Motion, carriers: list[Motion]) -> tuple[Motion, Motion]:
     """Return motions in {G} of a platform, given in the frame of the only carrier if `relative`, and of all carriers.
 
-    The carriers' is (n, c, 6). Derivatives by another parameter than the time are turned in the same way.
+    The carriers' is (n, c, 6). Derivatives by another parameter than the time are turned in the same way, by the
+    chain rule.
     """
     if relative:
         pose, velocity, acceleration = dynamics.relative.motion_in_world(*platform, *carriers[0])

@@ -34,7 +34,8 @@ SchemeName = Literal["linear", "hermite", "spline"]
 class Scheme(Displayed):
     """A transcription scheme.
 
-    An interval has points at its start, at each share in `inner`, and at its end; every point has q, v and a.
+    An interval has a point at its start, one at each share in `inner`, and one at its end, which is the next
+    interval's start. Every point has q, v and a.
     """
 
     name: SchemeName

@@ -241,7 +241,8 @@ class Task(Part):
     def model_dump(self, **options: Any) -> dict[str, Any]:
         """Return the fields, by `options` of pydantic; without `path` if that follows from `phases`.
 
-        Raises `InputError` in mode "json", as for a file, if the task has limits or costs defined in Python.
+        Raises:
+            InputError: In mode "json", as for a file, if the task has limits or costs defined in Python.
         """
         for key, own in (("limits", self.limits.own), ("objective", self.objective.own)):
             if own and options.get("mode") == "json":
@@ -271,7 +272,10 @@ class Task(Part):
     def seconds(self) -> float:
         """Return the duration of the motion [s]; for a range its geometric mean, from which the planner starts.
 
-        Durations below the dwell times of the path are excluded. Raises `InputError` if nothing gives the duration.
+        If the path has dwell times, durations below their sum are excluded.
+
+        Raises:
+            InputError: If neither the task nor its path gives it.
         """
         if isinstance(self.duration, PositiveRange):
             return float(np.sqrt(max(self.duration.min, self.path.resting) * self.duration.max))

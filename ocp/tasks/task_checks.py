@@ -69,7 +69,10 @@ def _check_frame(robot: Robot, task: Task, where: str) -> None:
 
 
 def check_margin(robot: Robot, task: Task) -> None:
-    """Refuse a margin that exceeds half the tension range of a cable, naming the largest margin and the cable."""
+    """Refuse a margin that exceeds half the tension range of a cable.
+
+    Raises `InputError` naming the largest margin and the cable.
+    """
     for index, (low, high) in enumerate(zip(robot.t_min, robot.t_max, strict=True)):
         if low + task.margin > high - task.margin:
             raise InputError(

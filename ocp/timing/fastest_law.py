@@ -144,11 +144,17 @@ class FastestLaw(Displayed):
 
     @cached_property
     def bottlenecks(self) -> list[Bottleneck]:
-        """Return the stretches of the path, in order, with the active limit of each; empty without a time law."""
+        """Return the stretches of the path, in order, with the active limit of each.
+
+        The list is empty without a time law.
+        """
         return bottlenecks(self.parametrised, self.limits, self.margin, self.path) if self.exists else []
 
     def timed(self, path: Curve) -> TimedPath:
-        """Return a path of the platform or of a carrier with the time law, or raise InputError if it is not a path."""
+        """Return a path of the platform or of a carrier with the time law.
+
+        Raises `InputError` if `path` is not a path.
+        """
         required("path", path, PathBase)
         law: dict[str, Any] = {
             "s": tuple(self.s.tolist()),

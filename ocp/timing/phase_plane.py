@@ -36,9 +36,10 @@ class PhasePlane(Displayed):
     winches: "Winches | None"  # None if none has a motor of its own
 
     def rows(self, weight: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return all limits but x_max as a u + b x + c <= 0, (N, K) each, in parts of the weight or of each limit.
+        """Return all limits but x_max as a u + b x + c <= 0, (N, K) each, without units.
 
-        The last row is 1 <= 0 where even rest needs a wrench outside the span of the cables.
+        Rows of tensions are in parts of the weight, the others in parts of their limits. The last row is 1 <= 0 where
+        even rest needs a wrench outside the span of the cables.
         """
         a, b, c = self.tension_rows(weight)
         beside = np.einsum("nij,nj->ni", self.available.outside, self.wrench.c - self.available.offset)
@@ -115,9 +116,11 @@ def phase_plane(
     reserve: np.ndarray | float = 0.0,
     shrink: float = 0.0,
 ) -> PhasePlane:
-    """Return the limits at the points s (N,), or raise InputError if the motion needs wrenches that cables do not span.
+    """Return the limits at the points s (N,).
 
-    Tensions are less `margin` [N], wrenches `reserve` (N,) [N] inside what these give, others less the share `shrink`.
+    Tensions are less `margin` [N], wrenches `reserve` (N,) [N] inside what these tensions give, and the other limits
+    reduced by the share `shrink`. Raises `InputError` if motion along the path needs wrenches outside the span of the
+    cables.
     """
     robot = parametrised.robot
     platform, carriers = parametrised.at(s)

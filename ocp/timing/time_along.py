@@ -304,7 +304,8 @@ def _toppra() -> tuple[Any, Any]:
 def geometry(path: AnyPath, *, alone: bool) -> Curve:
     """Return the curve of a path; `alone` if no other path is followed with the same s.
 
-    Raises `InputError` for splines and samples that turn too sharply or do not move, sequences, returns and feeds.
+    Raises `InputError` if a spline or samples turn so sharply that they must rest, or move nowhere, or for a
+    sequence, a return or a feed.
     """
     if isinstance(path, SequencePath):
         raise InputError("path.kind must not be sequence to time a path; time its parts one by one")

@@ -26,7 +26,8 @@ _STEP = 1e-11
 # become a proof that they do not meet.
 _CHECK = 50
 
-_ROUNDING = 1e-12  # rounding of s, and of the multipliers, in that question
+# Rounding of s, and of the multipliers, in that question.
+_ROUNDING = 1e-12
 
 
 class Dykstra(Method):

@@ -12,9 +12,10 @@ from .method import Method, Proposal, StandardForm
 class ImprovedClosedForm(Method):
     """Closed form in which cables beyond their limits are held there, one after the other.
 
-    Existence: not guaranteed, since a held cable is never released (status failed, `detail` reports where it stopped).
-    Continuous while the same cables are held; it may jump where the worst changes, by weighted excess. Cost: at most
-    m - rank + 1 pseudo-inverses. Outside the feasible set: a certificate.
+    Existence: better than the closed form, still not guaranteed: a cable that was held is never released (status failed
+    then, `detail` reports where it stopped). Continuous as long as the same cables are held; where the choice of the
+    worst cable changes it may jump. Cost: at most m - rank + 1 pseudo-inverses. Outside the feasible set: a
+    certificate. With weights the worst cable is the one with the largest weighted excess.
     """
 
     name = "improved-closed-form"

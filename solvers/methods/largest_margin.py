@@ -11,8 +11,9 @@ from .numerics.linear_program import TIE, deepest, nearest
 class LargestMargin(Method):
     """Maximise the smallest distance of a tension to its limits, in newtons ("optimally safe").
 
-    Existence: wherever the problem is feasible; failed if no limit is finite. The margin is continuous; the tensions
-    are unique, by the distance to t_ref, continuous in w for a fixed wrench matrix, and may jump as cables turn. Equal
+    Existence: wherever the problem is feasible; failed if
+    nothing limits the margin (infinite limits). The largest margin itself is continuous; the tensions are unique, by
+    the distance to t_ref, continuous in w for a fixed wrench matrix, and may jump as cables turn. Cables with equal
     limits do not count. Cost: one linear program and one quadratic one. Outside the feasible set: a certificate.
     """
 

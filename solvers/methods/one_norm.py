@@ -8,7 +8,8 @@ from .method import Method, Proposal, StandardForm
 from .numerics.feasible_polytope import EMPTY, FAR, meet
 from .numerics.linear_program import optimise
 
-_TIE = 1e-10  # corners whose norms differ by less, over their largest tension, count as equally good
+# Corners whose norms differ by less, relative to the largest tension among them, count as equally good.
+_TIE = 1e-10
 
 
 class OneNorm(Method):

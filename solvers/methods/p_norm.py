@@ -16,8 +16,11 @@ from .numerics.least_norm import bounded_least_norm, least_norm
 
 _STEPS = 200
 
-_FLOOR = 1e-6  # least curvature, relative to the largest: at s_i = 0 the p-norm has none and a Newton step no length
-_CONVERGED = 1e-13  # stop when a full step would lower the cost by no more than this part of it
+# Least curvature, relative to the largest: at s_i = 0 the p-norm has none and a Newton step no length.
+_FLOOR = 1e-6
+
+# Stop when a full step would lower the cost by no more than this part of it.
+_CONVERGED = 1e-13
 
 
 class PNorm(Method):

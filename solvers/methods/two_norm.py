@@ -13,8 +13,9 @@ from .one_norm import OneNorm
 class TwoNorm(Method):
     """Nearest to t_ref, by comparing the corners of the feasible polygon with the nearest points of its edges.
 
-    Existence, continuity and tensions are those of "active-set" and "min-norm", outside the feasible set too. Cost: a
-    fixed number of steps, pairs of lines, for m - rank <= 2; beyond, the active set.
+    The same tensions as "active-set" and "min-norm", from a fixed number of steps. It exists where theirs do, is as
+    continuous, and behaves in the same way outside the feasible set. Cost: pairs of lines for m - rank <= 2; beyond,
+    the active set.
     """
 
     name = "2-norm"

@@ -29,8 +29,9 @@ AT_ONCE = 4096
 class EquilibriumPosture(Condition):
     """At the given position, tensions inside the limits hold the platform at rest in some attitude.
 
-    Newton's method searches for one attitude from level, whatever that of the configuration; a failure is false, and
-    proves nothing. With the drive fixed-length the position is unknown too, from the given one (`postures`).
+    The attitude of the configuration is ignored. Newton's method searches for one attitude, starting from level. If the
+    search fails, the condition is false, which proves nothing. If the robot's drive is fixed-length, the position is
+    unknown too, and its search starts from the given one: `postures` returns the resulting pose.
     """
 
     kind: Literal["equilibrium-posture"] = "equilibrium-posture"
@@ -47,7 +48,8 @@ class EquilibriumPosture(Condition):
     def postures(self, robot: Robot, places: Places) -> tuple[np.ndarray, np.ndarray]:
         """Return poses (n, 6) at rest and their tensions (n, m) [N], of any sign; nan where Newton did not converge.
 
-        Raises `InputError` if the platform cannot turn about all axes, or has fewer than three cables or no weight.
+        Raises:
+            InputError: If the platform cannot turn about all three axes, or has fewer than three cables or no weight.
         """
         check_places(robot, places)
         if robot.drive == "fixed-length" and robot.m > 3:

@@ -30,7 +30,8 @@ class Margin(Condition):
     def margins(self, robot: Robot, places: Places) -> np.ndarray:
         """Return signed distances of the wrench at rest from the boundary of the available wrench set, (n,) [N].
 
-        Inside, they are those of `capacity_margin`, also for a flat set; outside, they are negative bounds.
+        Inside, they are positive and equal to `solvers.capacity_margin`, also for a flat set. Outside, they are
+        negative bounds: the distance is at least as large, and equal if a facet is closest.
         """
         check_places(robot, places)
         rows = wrench_rows(robot)

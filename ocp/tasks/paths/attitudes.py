@@ -24,7 +24,10 @@ SAME = 1e-12  # [rad]
 
 
 class Attitudes:
-    """Attitudes (roll, pitch, yaw) in order, (n, 3) [rad], and the shortest turns between them."""
+    """Attitudes in order, and the shortest turns between them.
+
+    `angles`: (n, 3), (roll, pitch, yaw) [rad].
+    """
 
     def __init__(self, angles: np.ndarray):
         self._angles = angles

@@ -24,8 +24,9 @@ SHORTEST = 1e-12  # of the length: a shorter piece has no nodes
 class FeedPath(PathBase):
     """Lines through given positions at a steady speed, the feed; corners are rounded within a tolerance.
 
-    The speed is less where the limited acceleration requires it: at sharp corners, while starting and stopping. At
-    points with a dwell, and where the path turns back, the motion stops. The attitude is constant.
+    The speed is the feed, except where the limited acceleration requires less: at sharp corners, and while starting and
+    stopping. At points with a dwell, and where the path turns back, the motion stops. The attitude is the same
+    everywhere.
     """
 
     kind: Literal["feed"]
@@ -188,8 +189,9 @@ def _cells(curve: RoundedCorners) -> tuple[np.ndarray, np.ndarray]:
 def _reached(square: np.ndarray, reach: np.ndarray, bent: np.ndarray) -> np.ndarray:
     """Return the squared speeds at the ends of cells, (k + 1,), that are reached one after the other.
 
-    In a cell of length h and curvature c, |a_t|^2 + (c v^2)^2 <= a^2: with `reach` 2 a h and `bent` 2 c h, y from x
-    obeys (y - x)^2 + (bent y)^2 <= reach^2.
+    In a cell of the length h and the curvature c the acceleration along the path leaves room for that across it,
+    |a_t|^2 + (c v^2)^2 <= a^2: `reach` is 2 a h and `bent` 2 c h, so that y from x obeys (y - x)^2 + (bent y)^2 <=
+    reach^2.
     """
     x = float(square[0])
     result, whole = [x], (1 + bent**2).tolist()

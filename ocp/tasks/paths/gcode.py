@@ -85,7 +85,10 @@ class _Reader:
         self._feed: float | None = None
 
     def read(self, line: str) -> None:
-        """Read one line, or raise ValueError with what it must be."""
+        """Read one line.
+
+        Raises `ValueError` with what it must be.
+        """
         line = MARK.sub("", COMMENT.sub(" ", line.upper()).strip())
         if self._ended and line:
             raise ValueError("nothing must follow the end of the program, M2 or M30")

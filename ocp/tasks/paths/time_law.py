@@ -8,9 +8,10 @@ SLOW = 1e-6  # of the largest speed: so slow is at rest
 
 
 class TimeLaw:
-    """A motion s(t): d2s/dt2 is constant between the given points s, increasing, (n,), of any unit.
+    """A motion s(t): d2s/dt2 is constant between the given points; where ds/dt is zero it can dwell.
 
-    - `speeds`: ds/dt there, (n,), never zero at two neighbours; where it is zero the motion can dwell.
+    - `s`: increasing, (n,), of any unit.
+    - `speeds`: ds/dt there, (n,), never zero at two neighbours.
     - `dwell`: how long it stops at each s, (n,) [s].
     """
 
@@ -56,9 +57,12 @@ class TimeLaw:
 
 
 class SmoothedLaw:
-    """The mean of a `law` over the last `window` [s]: it starts, stops and ends without acceleration.
+    """The mean of a law over the last `window`: it starts, stops and ends without acceleration.
 
     It waits for this time wherever the law rests, so that the mean rests there too.
+
+    - `law`: the law.
+    - `window`: time over which the mean is taken [s].
     """
 
     def __init__(self, law: TimeLaw, window: float):

@@ -26,7 +26,9 @@ Curve: TypeAlias = Annotated[RestPath | LinePath | CirclePath | WaypointPath | S
 class TimedPath(PathBase):
     """A path with its own time law: d2s/dt2 is constant between the given points; at the end the path stops.
 
-    It can dwell where ds/dt is zero. `time_along` creates such paths.
+    It can dwell where ds/dt is zero.
+
+    `time_along` creates such paths.
     """
 
     kind: Literal["timed"]

@@ -13,9 +13,11 @@ STILL = np.zeros(6)
 
 
 class WaypointSpline:
-    """A spline through `points` (n, 6); knots by the square root of distances keep it near to them.
+    """A spline through points, with its knots by the square root of their distances, which keeps it near to them.
 
     Velocity and acceleration are zero at its ends. Angles change by less than half a turn from point to point.
+
+    - `points`: (n, 6) poses.
     - `times`: (n,), the times of the points [s]; default: any duration.
     """
 
@@ -25,7 +27,10 @@ class WaypointSpline:
         self._steps = np.linalg.norm(np.diff(self._points, axis=0), axis=1)  # a radian counts as a metre
 
     def check(self) -> None:
-        """Raise ValueError that names the second of two points without times that are too near to each other."""
+        """Refuse points without times that are too near to each other.
+
+        Raises `ValueError` naming the second of them.
+        """
         near = np.flatnonzero(self._steps <= NEAREST * self._steps.sum())
         if self._times is None and near.size:
             index = int(near[0])

@@ -240,7 +240,8 @@ class WaypointPath(PathBase):
 def shortest_order(points: np.ndarray) -> list[int]:
     """Return the indices of points (n, 6) [m, rad] in the order of the shortest path; the first and the last one stay.
 
-    1 rad is taken as 1 m. Source: Held and Karp, "A dynamic programming approach to sequencing problems", 1962.
+    1 rad is taken as 1 m, and angles turn the shortest way. Source: M. Held, R. M. Karp, "A dynamic programming
+    approach to sequencing problems", 1962.
     """
     apart = points[:, None] - points
     apart[..., 3:] -= 2 * np.pi * np.round(apart[..., 3:] / (2 * np.pi))

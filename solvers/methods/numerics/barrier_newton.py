@@ -22,20 +22,38 @@ from .linear_program import deepest
 _STEPS = 50
 _DAMPED_STEPS = 300
 
-_CONVERGED = 1e-18  # squared Newton decrement, in units of mu: with less, a full step changes nothing that counts
-_ROUNDING = 1e-3  # a smaller decrement squares with each step; one that does not fall is rounding at the limits
-_ON_PLANE = 1e-10  # error in Q s = b from which on plain Newton steps take over
-_CENTRED = 0.5  # largest distance of products of distance and multiplier from mu, over mu, for plain Newton steps
-_REDUCTION = 0.05  # by how much one step may lower the products of distance and multiplier, towards mu
-_FRACTION = 0.99  # the share of the distance to the nearest limit that a step may go
-_NO_SPACE = 1e-13  # a distance to a limit, in units of s, that rounding may cancel
-_FAR = 1e9  # in units of s, which is of order one: a minimiser out here means that there is none
+# Squared Newton decrement, in units of mu, below which the next full step would change nothing that counts.
+_CONVERGED = 1e-18
+
+# A decrement below this squares with each step; one that does not fall is rounding, of tensions next to their limits.
+_ROUNDING = 1e-3
+
+# Error in Q s = b from which on plain Newton steps take over.
+_ON_PLANE = 1e-10
+
+# How far, relative to mu, the products of distance and multiplier may be from mu when plain Newton steps take over.
+_CENTRED = 0.5
+
+# By how much one step may lower the products of distance and multiplier, towards mu.
+_REDUCTION = 0.05
+
+# The share of the distance to the nearest limit that a step may go.
+_FRACTION = 0.99
+
+# A distance to a limit, in units of s, that rounding may cancel.
+_NO_SPACE = 1e-13
+
+# In units of s, which is of order one: a minimiser out here means that there is none.
+_FAR = 1e9
 
 
 def barrier_point(form: StandardForm, square: float, mu: float, start: Array | None) -> Proposal:
-    """Find the minimiser, with c = `square`, 0 or 1, and `mu`; with 0 the feasible tensions must be bounded.
+    """Find the minimiser.
 
-    `start` is where to begin, shape (k,), anywhere; None = in the middle of the limits.
+    - `form`: the problem.
+    - `square`: c, 0 or 1. With 0 the feasible tensions must be bounded.
+    - `mu`: weight of the logarithms.
+    - `start`: where to begin, shape (k,), anywhere; None = in the middle of the limits.
     """
     if not form.lower.size:
         return Proposal(np.zeros(0))

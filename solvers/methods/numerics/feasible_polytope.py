@@ -17,9 +17,15 @@ from numpy.typing import NDArray
 from ....base.tolerances import AT_LIMIT
 from ..method import Array, StandardForm
 
-_SLACK = 1e-12  # how far a corner may lie beyond a limit, relative to the size of s
-_PARALLEL = 1e-13  # lines that meet at a smaller angle have their corner nowhere
-FAR = 1e8  # in units of s, of order one: where a missing limit is put. A corner out there means there is no bound
+# How far a corner may lie beyond a limit, relative to the size of s.
+_SLACK = 1e-12
+
+# Lines that meet at a smaller angle have their corner nowhere.
+_PARALLEL = 1e-13
+
+# In units of s, which is of order one: where a missing limit is put. A corner out there means there is no bound.
+FAR = 1e8
+
 EMPTY = "the lines of the limits enclose nothing"  # why a method has no point
 
 

@@ -31,7 +31,9 @@ def least_norm_in_null_space(form: StandardForm) -> Proposal:
 def bounded_least_norm(upper: Array, lower: Array, rows: Array, equalities: int) -> Proposal:
     """Minimise |x|^2 subject to lower <= (x, rows x) <= upper; the last `equalities` rows are equations.
 
-    `upper` and `lower` have limits of x, as far as they go beyond the rows, followed by those of the rows (rows, x).
+    - `upper`, `lower`: limits of x, as far as they go beyond the rows, followed by those of the rows.
+    - `rows`: shape (rows, x).
+    - `equalities`: how many of the last rows have equal limits.
     """
     import daqp
 

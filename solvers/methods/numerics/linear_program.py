@@ -16,7 +16,8 @@ _OPTIONS = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance":
 # HiGHS's status: unbounded, or presolve cannot decide whether unbounded or infeasible. A certificate decides.
 _UNBOUNDED = (3, 4)
 
-TIE = 1e-10  # by how much the optimum may be missed in the choice among equally good tensions, relative to its size
+# By how much the optimum may be missed in the choice among equally good tensions, relative to its size.
+TIE = 1e-10
 
 
 def optimise(
@@ -29,8 +30,11 @@ def optimise(
 ) -> Proposal:
     """Minimise cost . (s, extra) subject to Q s = b, the limits of s, and rows (s, extra) <= limits.
 
-    - `cost`, `rows`, `limits`: shapes (k + extras,), (rows, k + extras) and (rows,); infinite limits are no limits.
-    - `nonnegative`, `most`: whether the extra variables are not negative, and what they may be at most.
+    - `form`: the problem.
+    - `cost`: shape (k + extras,).
+    - `rows`, `limits`: shape (rows, k + extras) and (rows,); infinite limits are no limits.
+    - `nonnegative`: True if the extra variables are not negative.
+    - `most`: what the extra variables may be at most.
     """
     from scipy.optimize import linprog
 
