@@ -68,13 +68,13 @@ class Matching:
         # too.
         self.windows = windows
         self._linearise(parameters)
-        echo, sensors = self._echo(parameters), dict(windows.noise)
+        echo, sensors = self._echo(self.at(parameters)), dict(windows.noise)
         # what residuals are if nothing except noise differs, in windows from the recorded state on, by kind
         self.noise = self._with_echo(sensors, echo)
         windows.noise = self._with_echo(sensors, self._project(echo))
         self._linearise(parameters)
-        self._echoed = self._project(self._echo(parameters))
         self.first = self.at(parameters)  # residuals with the first parameters
+        self._echoed = self._project(self._echo(self.first))
         # windows that are no outliers, (W,) of bool
         self.kept = self._good & (self.first.cost <= OUTLYING * np.median(self.first.cost))
 
@@ -104,11 +104,10 @@ class Matching:
         """Return (W, R + P) without what other starts would explain."""
         return vectors - (self._Q @ (self._Q.swapaxes(1, 2) @ vectors[..., None]))[..., 0]
 
-    def _echo(self, parameters: Parameters) -> np.ndarray:
-        """Return what the noise of the recording does to its simulation, over the noise, (W, R + P)."""
-        shaken = self.windows.shaken()
-        away = np.nan_to_num(shaken.predict(parameters)[0] - self.windows.predict(parameters)[0])
-        return np.concatenate([away, np.zeros_like(self.windows.start)], axis=1)
+    def _echo(self, first: Match) -> np.ndarray:
+        """Return what the noise of the recording does to the simulation of a match, over the noise, (W, R + P)."""
+        away = np.where(first.drift == LOST, 0.0, self.windows.shaken().predict(first.parameters)[0] - first.drift)
+        return np.concatenate([np.nan_to_num(away), np.zeros_like(self.windows.start)], axis=1)
 
     def _with_echo(self, noise: Mapping[str, float], echo: np.ndarray) -> dict[str, float]:
         """Return the noise of each kind of residual, of sensors and of the simulation."""
@@ -122,14 +121,13 @@ class Matching:
         away = self._away(parameters)
         return Match(parameters, away[:, : -self.windows.start.shape[1]], self._project(away))
 
-    def slope(self, parameters: Parameters, name: str) -> np.ndarray:
-        """Return the derivatives of the residuals by a parameter of k numbers, (k, W, R + P)."""
-        (_, high, step), value = RANGES[name], np.atleast_1d(getattr(parameters, name))
-        first, slopes = self.windows.predict(parameters)[0], []
+    def slope(self, first: Match, name: str) -> np.ndarray:
+        """Return the derivatives of the residuals of a match by a parameter of k numbers, (k, W, R + P)."""
+        (_, high, step), value, slopes = RANGES[name], np.atleast_1d(getattr(first.parameters, name)), []
         for number in range(len(value)):
             away = (step if value[number] + step <= high else -step) * np.eye(len(value))[number]
-            end = self.windows.predict(_with(parameters, name, value + away))[0]
-            change = np.nan_to_num((end - first) / away[number])
+            end = self.windows.predict(_with(first.parameters, name, value + away))[0]
+            change = np.where(first.drift == LOST, 0.0, np.nan_to_num((end - first.drift) / away[number]))
             slopes.append(self._project(np.concatenate([change, np.zeros_like(self.windows.start)], axis=1)))
         return np.array(slopes)
 
@@ -139,7 +137,7 @@ class Matching:
         usual = self.windows.usual_tension if name == "cable_friction" else 1.0
         sigma, least = np.full(size, np.inf), 0.0 if size == 1 else 1 / (SHOWN * usual) ** 2
         for _ in range(STEPS):
-            slope, value = self.slope(best.parameters, name)[:, used], np.atleast_1d(getattr(best.parameters, name))
+            slope, value = self.slope(best, name)[:, used], np.atleast_1d(getattr(best.parameters, name))
             steep = np.einsum("iwr,jwr->wij", slope, slope)
             along = np.einsum("iwr,wr->wi", slope, best.left[used])
             if not np.trace(steep.sum(axis=0)) > 0:
@@ -183,7 +181,7 @@ class Matching:
             shown = inside and bool((sigma[certainly] if certainly.any() else sigma).max() < SHOWN * size)
             if name == "stiffness":  # noise of lengths, which it multiplies, would make it too small
                 noise = np.sum(self._echoed[used] ** 2)
-                shown = shown and noise <= BLURRED * np.sum(self.slope(first.parameters, name)[:, used] ** 2)
+                shown = shown and noise <= BLURRED * np.sum(self.slope(first, name)[:, used] ** 2)
             explained = float(removed / max(whole - count, removed, 1e-12))
             least = LEAST[int(name in ALONE)]
             named = shown and bool(certainly.any()) and explained > least and removed > REMOVED * whole

@@ -200,6 +200,7 @@ class Windows:
         """Evaluate what was recorded along the windows."""
         of, count = self.recorded, max(1, round(self.window / STEP))
         self._dt = self.window / count
+        self._substeps = steps_in(self._dt, Plant(self.robot, drive=self.drive))
         self._grid = self.starts[:, None] + self._dt * np.arange(count + 1)  # (W, K + 1)
         carriers = np.tile(of.robot.carrier_home, (*self._grid.shape, 1, 1))
         for index, track in self._carriers.items():
@@ -296,16 +297,17 @@ class Windows:
         """
         m, W, (steps, dt) = self.robot.m, len(self.starts), (self._grid.shape[1] - 1, self._dt)
         plant = Plant(changed(self.robot, with_), drive=self.drive)
-        substeps = steps_in(dt, Plant(self.robot, drive=self.drive)) + (with_.stiffness > 1.5)
+        substeps = self._substeps + (with_.stiffness > 1.5)
         by = np.diag(self._steps_of_start) if nudged else np.zeros((0, len(self.start_sigma)))
         shift = self.start + np.concatenate([np.zeros((1, 1, by.shape[1])), by[:, None]])  # (V, W, P)
         count = len(shift)
         states, own = self._states(plant, self._tensions_at_start(with_), shift)
         rows, cables = self._commands(plant, with_, own)
-        out = np.zeros((count, *self.rows.shape, 7 + 2 * m))
         at = (self.recorded.times[self.rows] - self.starts[:, None]) / dt
         number = np.clip(np.floor(at).astype(int), 0, steps - 1)
         history, tensions = np.zeros((count * W, 2, plant.size)), np.zeros((count * W, 2, m))
+        seen = [np.zeros((count, *self.rows.shape, part.shape[-1])) for part in (history, tensions)]
+        commands = np.zeros((count, W, 2, rows.shape[-1]))
         periods = Periods(plant, dt, substeps)
         with np.errstate(all="ignore"):
             for k in range(steps):
@@ -314,15 +316,17 @@ class Windows:
                     body = states[:, layout.BODY * (1 + index) : layout.BODY * (2 + index)]
                     body[:, layout.QUATERNION : layout.VELOCITY] = np.tile(attitude[:, k, :4], (count, 1))
                     body[:, layout.RATE :] = np.tile(attitude[:, k, 4:], (count, 1))
-                command = np.tile(rows[:, k : k + 2], (count, 1, 1))
-                command[:, 0, layout.COMMANDS : layout.COMMANDS + m] = cables[:, :, k].reshape(count * W, m)
-                periods.run(states, command, history, tensions)
+                commands[:] = rows[:, k : k + 2]
+                commands[:, :, 0, layout.COMMANDS : layout.COMMANDS + m] = cables[:, :, k]
+                periods.run(states, commands.reshape(count * W, 2, -1), history, tensions)
                 w, s = np.nonzero(number == k)
                 if len(w):
                     share = (at[w, s] - k)[:, None]
-                    ends = [part.reshape(count, W, 2, -1)[:, w] for part in (history, tensions)]
-                    out[:, w, s] = _seen(plant, *((1 - share) * one[:, :, 0] + share * one[:, :, 1] for one in ends))
+                    for part, ends in zip(seen, (history, tensions), strict=True):
+                        ends = ends.reshape(count, W, 2, -1)[:, w]
+                        part[:, w, s] = (1 - share) * ends[:, :, 0] + share * ends[:, :, 1]
                 states[:] = history[:, 1]
+            out = _seen(plant, *seen)
         speeds = np.take_along_axis(self._cable_speed, number[..., None], axis=1)  # (W, S, m)
         friction = (with_.friction + np.array(with_.cable_friction)) * np.tanh(speeds / SLOW)
         residuals = self._residuals(out, plant, friction, with_)
@@ -381,7 +385,7 @@ class Windows:
 
 
 def _seen(plant: Plant, states: np.ndarray, tensions: np.ndarray) -> np.ndarray:
-    """Return position, quaternion (x, y, z, w), tensions and lengths of states (V, n, size), (V, n, 7 + 2 m)."""
+    """Return position, quaternion (x, y, z, w), tensions and lengths of states (..., size), (..., 7 + 2 m)."""
     motions, lengths = sensed(plant.robot, states)
     q = states[..., layout.QUATERNION : layout.VELOCITY]
     quaternion = np.where(np.isfinite(q).all(axis=-1, keepdims=True), q, 1.0)[..., [1, 2, 3, 0]]

@@ -141,7 +141,7 @@ def test_a_log_in_parts_gives_the_same_result(monkeypatch, known):
     prior = None if known else {"anchors": 0.02, "offsets": 0.05}
     whole = calibrate(robot, log, prior=prior)
     assert [(one.cable, one.sample) for one in whole.slips] == [(3, 60)]
-    monkeypatch.setattr(model_module, "PART", 17)
+    monkeypatch.setattr(model_module, "PART", 50)
     parts = calibrate(robot, log, prior=prior)
     assert [one.name for one in parts.parameters] == [one.name for one in whole.parameters]
     for name in ("value", "sigma"):

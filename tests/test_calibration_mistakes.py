@@ -87,9 +87,12 @@ def mistakes(robot, poses, y):
 
 @pytest.mark.parametrize("name", [name for name in ROBOTS if name != "ipanema-1"])  # which is like cogiro
 def test_mistakes_are_named_and_mended(name):
+    """Each mistake with three or four of the robots."""
     robot, poses, y = a_log(name)
     length = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean()
-    for what, (given, lengths) in mistakes(robot, poses, y).items():
+    for number, (what, (given, lengths)) in enumerate(mistakes(robot, poses, y).items()):
+        if (number + ROBOTS.index(name)) % 6 < 2:
+            continue
         found = mistake(robot, Measurements(lengths, given))
         assert found is not None, what
         assert found.text.isprintable()
