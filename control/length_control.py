@@ -19,6 +19,7 @@ from .bandwidths import age_of, noise_of
 from .command import HOLD, OFF, PLANNED, Command
 from .controller import Controller
 from .deviation import Deviation
+from .lag import SHORTEST, Lag
 from .length_gains import LengthGains
 from .noise import Noise
 from .open_loop import planned_command
@@ -27,6 +28,8 @@ from .state import Reference, State
 SHARE, STRAIN = 0.05, 0.005  # of the robot's length, and of the longest cable: the default of `most`
 DAMPED = 0.002  # [s]: damping of unknown cables, in terms of their stiffness
 PERIOD = 1e-3  # [s]: taken to be that of the steps at the first one
+QUICKEST = 2e-3  # [s]: in which winches follow that are said to have no lag
+SAMPLED = 2000  # references that are looked at before a run
 
 
 class LengthControl(Controller):
@@ -36,9 +39,10 @@ class LengthControl(Controller):
 
     where s are the strains at which cables with the stiffness EA and the file's damping have the planned tensions, x is
     the planned pose, J the Jacobian of the lengths, and e the error of the measured pose, whose rotation is a vector in
-    {G}, so that no attitude is special. The tensions are those planned for the time at which the winches will have
-    followed, x for the end of the period after it. Tensions of a robot with more cables than degrees of freedom follow
-    from the lengths; they are not controlled. With a lag, e and its integral are extrapolated to first order.
+    {G}, so that no attitude is special. Winches with a lag get the lengths with which they reach these L0 at the end of
+    the period, as with x; e and its integral are extrapolated over the lag to first order. Tensions of a robot with
+    more cables than degrees of freedom follow from the lengths; they are not controlled. Winches that hold a length for
+    a long period move unevenly: `follow` warns if this stretches cables as much as the planned tensions do.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file. Its carriers must not fly.
@@ -47,8 +51,7 @@ class LengthControl(Controller):
             degrees of freedom).
         damping: C [N s/m], a number or one for each cable, instead of the file's values; 2 ms times `stiffness`
             is assumed for a cable without stiffness in the file.
-        lag: Time constant with which the winches follow their commands [s]: lengths are commanded earlier by this time,
-            and their corrections with as much lead.
+        lag: Time constant with which the winches follow their commands [s], which the lengths make up for.
         proportional, integral: P, and I [1/s]; 0 and 0 for lengths without correction. The default is the largest, up
             to 4 and 10, with which no oscillation of the platform on its cables grows (control/length_gains.py). It
             depends on the age of the measured pose (from its `time`, or else from `sensors`), and is 0 for cables with
@@ -126,8 +129,32 @@ class LengthControl(Controller):
     def reset(self) -> None:
         self._time: float | None = None
         self._sum: np.ndarray | None = None  # integral of the error, (..., 6)
-        self._tensions: np.ndarray | None = None  # planned at the last step, (..., m)
+        self._period = np.inf  # of the references [s], inf: unknown
+        self._winches, self._sent = Lag(self._lag), np.zeros(0)  # and their lengths without corrections, (..., m)
         self._strain: np.ndarray | None = None  # commanded at the last step, (..., m)
+
+    @override
+    def follow(self, references: Sequence[Reference], period: float, start: float = 0.0) -> None:
+        """Learn the period, and warn if winches that hold each length for it would change tensions by their mean."""
+        self._period = number("period", period, 1e-6, 1e3)
+        lag = max(self._lag, QUICKEST)
+        lead, stride = _lead(lag, self._period), 1 + len(references) // SAMPLED
+        uneven = lead - lag - lag * np.log(lead / lag)  # [s]: largest lead of a winch that reaches a ramp at its end
+        some = [as_floats(required("references", one, Reference), self.robot, None) for one in references[::stride]]
+        if len(some) < 2 or any(one.tensions is None for one in some) or np.isinf(self.stiffness).any():
+            return
+        lengths = self._dynamics.cable_lengths(*(np.array([one[part] for one in some]) for part in (0, 3)))
+        speeds = np.abs(np.diff(lengths, axis=0)) / (stride * self._period)
+        swings = uneven * speeds * self.stiffness / lengths[1:]  # (K - 1, m) [N]
+        pulls = np.array([one.tensions for one in some[1:]], dtype=float).mean(axis=1)
+        beyond = np.nan_to_num(swings.max(axis=1) - pulls)
+        if beyond.max() > 0:
+            swing, pull = (quantity(float(one[beyond.argmax()]), "N") for one in (swings.max(axis=1), pulls))
+            warn(
+                f"lengths commanded every {quantity(self._period, 's')} would change tensions by up to {swing}, more "
+                f"than the mean planned tension, {pull}, unless the winches interpolate: make the period shorter",
+                stacklevel=2,
+            )
 
     @override
     def step(self, time: float, state: State, reference: Reference) -> Command:
@@ -146,34 +173,33 @@ class LengthControl(Controller):
         if not is_time(time) or (self._time is not None and not float(time) > self._time):
             raise InputError(f"time must be a finite number that increases from step to step, got {shown(time)}")
         dt = 0.0 if self._time is None else float(time) - self._time
+        period = min(dt or np.inf, self._period)  # until the next step; more than that may have passed since the last
+        period = period if np.isfinite(period) else PERIOD
         age = self._age if state.time is None else time - measured_at(state.time, time)
-        pose, carriers, tensions = self._ahead(dt, reference)
-        far = self._dynamics.cable_lengths(pose, carriers)
+        tensions, lengths_of = self._tensions_of(reference), self._dynamics.cable_lengths
+        far = lengths_of(*(moved_on(part, period)[0] for part in (reference[:3], reference[3:6])))
         strain = self._strained(dt, tensions, far)
         if not (np.isfinite(far).all() and np.isfinite(strain).all()):
             raise InputError(f"reference must have finite lengths of cables, got pose {shown(reference.pose.tolist())}")
-        corrected, status = self._correction(dt, age, state, reference)
-        lengths, self._strain = far / (1.0 + strain) + corrected, strain
-        self._time, self._tensions = float(time), reference.tensions
+        if np.shape(self._winches.value) != far.shape:
+            self._winches.value = lengths_of(reference.pose, reference.carrier_pose) / (1.0 + strain)
+        elif dt > 0:
+            self._winches.follow(self._sent, dt)
+        given, lead = self._winches.value, _lead(self._lag, period)
+        self._sent = given + lead / period * (far / (1.0 + strain) - given)
+        corrected, status = self._correction(dt, period, lead - period, age, state, reference)
+        lengths, self._strain, self._time = self._sent + corrected, strain, float(time)
         command = planned_command(self.robot, reference, rows)
         return command._replace(answered=status, lengths=np.broadcast_to(lengths, command.tensions.shape))
 
-    def _ahead(self, dt: float, reference: Reference) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the planned pose, poses of carriers and tensions at the time when the winches will have followed.
-
-        Winches reach a length at the end of a period. Tensions are not extrapolated to it, because they may jump.
-        """
-        lag, tensions = self._lag, reference.tensions
-        (pose, *_), (carriers, *_) = (moved_on(part, lag + (dt or PERIOD)) for part in (reference[:3], reference[3:6]))
-        if tensions is None or not np.isfinite(tensions).all():
-            if np.isfinite(self.stiffness).any():
-                raise InputError(
-                    f"reference.tensions must be planned for cables that stretch, got {shown(reference.tensions)}"
-                )
-            return pose, carriers, np.zeros(self.robot.m)
-        if dt > 0 and self._tensions is not None and self._tensions.shape == tensions.shape:
-            tensions = tensions + lag / dt * (tensions - self._tensions)
-        return pose, carriers, tensions
+    def _tensions_of(self, reference: Reference) -> np.ndarray:
+        """Return the planned tensions, (..., m) [N]; they may jump, and are not extrapolated."""
+        tensions = reference.tensions
+        if tensions is not None and np.isfinite(tensions).all():
+            return tensions
+        if np.isfinite(self.stiffness).any():
+            raise InputError(f"reference.tensions must be planned for cables that stretch, got {shown(tensions)}")
+        return np.zeros(self.robot.m)
 
     def _strained(self, dt: float, tensions: np.ndarray, lengths: np.ndarray) -> np.ndarray:
         """Return the strains s at which damped cables have these tensions, t = EA s + C L0 ds/dt, (..., m)."""
@@ -182,7 +208,9 @@ class LengthControl(Controller):
             strain = strain + np.exp(-dt / np.maximum(settling, 1e-9)) * (self._strain - strain)
         return strain
 
-    def _correction(self, dt: float, age: float, state: State, reference: Reference) -> tuple[np.ndarray, np.ndarray]:
+    def _correction(
+        self, dt: float, period: float, lead: float, age: float, state: State, reference: Reference
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the corrections of lengths [m], (..., m), and the status (...): "hold" where one is at its bound."""
         pose, velocity, _ = moved_on(reference[:3], -age)
         carriers, jacobian, free = reference.carrier_pose, self._dynamics.length_jacobian, self.robot.dof_mask
@@ -191,20 +219,20 @@ class LengthControl(Controller):
             error, between = pose - state.pose, turned @ attitude.swapaxes(-1, -2)
             error[..., 3:] = axial(between)
             behind = np.zeros(1)  # planned minus measured speeds of the cables, (..., m) [m/s]
-            if self._lag:
+            if lead:
                 planned, measured = (velocity * free)[..., None], (state.velocity * free)[..., None]
                 behind = (jacobian(pose, carriers) @ planned - jacobian(state.pose, carriers) @ measured)[..., 0]
             known = np.asarray(np.isfinite(error).all(axis=-1) & np.isfinite(behind).all(axis=-1))
         error, behind = (np.where(known[..., None], one, 0.0) for one in (error * free, behind))
         before = np.zeros_like(error) if self._sum is None or self._sum.shape != error.shape else self._sum
         A = self._dynamics.wrench_matrix(reference.pose, carriers)  # (..., 6, m)
-        proportional, integral = self._gains_for(dt or PERIOD, age)
+        proportional, integral = self._gains_for(period, age)
         total = before + dt * error
         with np.errstate(over="ignore", invalid="ignore"):  # of states that overflow
-            ahead = proportional * error + integral * (total + self._lag * error)
+            ahead = proportional * error + integral * (total + lead * error)
             if any(com := self.robot.platform.com):  # about which A has the moments
                 ahead[..., :3] += np.cross(ahead[..., 3:], turned @ np.array(com))
-            wanted = proportional * self._lag * behind - (A.swapaxes(-1, -2) @ ahead[..., None])[..., 0]
+            wanted = proportional * lead * behind - (A.swapaxes(-1, -2) @ ahead[..., None])[..., 0]
         beyond = np.asarray(~(np.abs(wanted) <= self._most).all(axis=-1))
         self._sum = np.where(beyond[..., None], before, total)
         status = np.where(self._deviation.are_far(state.pose, pose, between), OFF, PLANNED)
@@ -218,3 +246,8 @@ class LengthControl(Controller):
             usual[0] if self._proportional is None else self._proportional,
             usual[1] if self._integral is None else self._integral,
         )
+
+
+def _lead(lag: float, period: float) -> float:
+    """Return how far ahead [s] the lengths of a ramp, held for a period, are commanded to be reached at its end."""
+    return period / -float(np.expm1(-period / max(lag, SHORTEST)))
