@@ -20,7 +20,8 @@ POSITION = np.arange(6) < 3  # coordinates of a pose
 def continued(trajectory: Trajectory, together: bool) -> Trajectory:
     """Return a trajectory that continues after its end, unless the robot rests there.
 
-    Last accelerations and rotations fade, and motions of carriers about the platform if they stay `together` with it.
+    Its last accelerations and rotations fade, and so do the motions of carriers relative to the platform if they stay
+    `together` with it.
     """
     end = trajectory.duration or 0.0
     last = trajectory.at(before(end))

@@ -50,7 +50,8 @@ def tensions(
         t_ref: Preferred tensions [N], a number or (m,) (default: 0).
         method, backend, **options: As for `towline.solve`.
 
-    Raises `InputError` if an argument has a wrong type, shape or value.
+    Raises:
+        InputError: If an argument has a wrong type, shape or value.
     """
     from ..models.dynamics import dynamics_of
     from ..models.files import as_robot

@@ -136,8 +136,9 @@ def _newton(robot: Robot, lengths: np.ndarray, start: np.ndarray, carriers: np.n
 def sensitivity(robot: Robot, rest: Equilibrium, carriers: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the derivatives of CoM and rotation vector in {G} by lengths and by a wrench at an equilibrium.
 
-    Carriers, (c, 6), are fixed, slack cables without effect. They are (6, m) [-, rad/m] and (6, 6) [m/N, rad/N, m/(N
-    m), rad/(N m)], of a wrench about the CoM. Also return undetermined motions of CoM and rotation vector, (6, k).
+    Carriers, (c, 6), are fixed, and slack cables have no effect. The derivatives are (6, m) [-, rad/m] and (6, 6)
+    [m/N, rad/N, m/(N m), rad/(N m)], of a wrench about the CoM. Also return neutral, that is, undetermined motions of
+    CoM and rotation vector, (6, k).
     """
     dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
     taut = np.setdiff1d(np.arange(robot.m), rest.slack)

@@ -38,7 +38,8 @@ class MotionResult(Drawn):
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Save the motion atomically: as NetCDF (.nc), which `xarray.load_dataset` reads, or as MCAP (.mcap).
 
-        The same motion gives the same bytes. Raises `InputError` if the file cannot be written.
+        A plan or a simulation that is computed again gives the same bytes. Raises `InputError` if the file cannot be
+        written.
         """
         return save_motion(self._of_robot, self._contents, file)
 

@@ -70,10 +70,12 @@ def uncertainty_of(robot: Robot) -> Uncertainty:
 class Spread:
     """Compute the first-order spread of tensions at n configurations due to geometric uncertainty.
 
+    - `robot`: robot with an uncertainty.
     - `pose`, `carrier_pose`: poses of the platform, (n, 6), and of the carriers, (n, c, 6), in {G} [m, rad].
     - `rows`: wrench rows that the cables balance; default: those of the coordinates that can move.
 
-    Raises `InputError` for wrong types or shapes, a robot without uncertainty, or with fewer cables than rows.
+    Raises `InputError` if an argument has a wrong type or shape, or the robot has no uncertainty or fewer cables than
+    rows.
     """
 
     def __init__(self, robot: Robot, pose: ArrayLike, carrier_pose: ArrayLike, rows: ArrayLike | None = None):
@@ -113,7 +115,8 @@ class Spread:
 def _inverse(A: np.ndarray) -> np.ndarray:
     """Return the minimum-norm inverse of matrices (n, rows, m), (n, m, rows).
 
-    Directions outside the span get huge tensions, not zero, because other robots need wrenches along them.
+    Directions that the cables do not span get huge tensions, not zero as in a pseudo-inverse, because other robots need
+    wrenches along them.
     """
     U, sigma, Vt = np.linalg.svd(A, full_matrices=False)
     if A.shape[1] > A.shape[2]:

@@ -35,7 +35,8 @@ def natural_frequencies(
         tensions: (..., m) [N]; cables with zero tension are slack and have no stiffness.
         carrier_pose: Pose of each carrier's frame, (..., c, 6); default: at home.
 
-    Raises `InputError` if an argument has a wrong shape or value, or a cable has no stiffness.
+    Raises:
+        InputError: If an argument has a wrong shape or value, or a cable has no stiffness.
     """
     robot = as_robot(robot)
     K = dynamics_of(robot).stiffness(pose, tensions, carrier_pose)
@@ -84,7 +85,8 @@ def stiffest(
         carrier_pose: The same of each carrier, (c, 6); default: at home.
         w: Required wrench about the CoM in {G} [N, N m], (6,); default: that of the platform at rest.
 
-    Raises `InputError` if an argument has a wrong shape or value, or a cable has no stiffness or no t_min above zero.
+    Raises:
+        InputError: If an argument has a wrong shape or value, or a cable has no stiffness or no t_min above zero.
     """
     robot = as_robot(robot)
     slack = np.flatnonzero(robot.t_min <= 0)

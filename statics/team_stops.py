@@ -367,9 +367,10 @@ def _limits(
 ) -> list[Row]:
     """Return what a motion of the carriers, (d, n, c, 6) each, requires, and the tensions, (d, n, m) [N].
 
-    `forces` are those of the cables on the platform, (d, n, m, 3) [N]; `turning` has rotations and two derivatives, (d,
-    n, c, 3, 3) each. With `limits_lacking` the force that is missing from actuators has a limit where a carrier turns
-    about another point than its anchor: it can turn too quickly for its cables to stay taut.
+    `forces` are those of the cables on the platform, (d, n, m, 3) [N].
+    `turning` has their rotations and the first and second derivative of these, (d, n, c, 3, 3) each. If
+    `limits_lacking`, a carrier that turns about another point than its anchor has a limit for the force that is missing
+    from its actuators: it can turn too quickly for its cables to stay taut.
     """
     its, (_, velocity, acceleration), R, pull = _carriers_of(robot), motion, turning[0], _pull(robot, forces)
     down = R.swapaxes(-1, -2)

@@ -30,7 +30,8 @@ def _winches(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
 def shares_of_winches(robot: Robot, trajectory: Trajectory, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return first and second derivatives of the lengths by tau, (n, m), over the accelerations that motors can give.
 
-    These have half of the force that the planned tensions leave, and as much as the plan itself needs.
+    These have half of the force that the planned tensions leave, the other half is for other tensions; and as much as
+    the plan itself needs.
     """
     motions, dynamics = trajectory.at(tau), dynamics_of(robot)
     before, now, after = (

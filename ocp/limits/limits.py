@@ -25,7 +25,8 @@ Motion: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]  # pose, velocity,
 class Separating(NamedTuple):
     """The distances of a limit, and planes between its bodies, for `BLOCK` instants.
 
-    `plane` returns the distance of a pair from its points, and the direction of a plane between both, (4,).
+    `plane` returns the distance of a pair from its points, and the derivative by a shift of the first body: the
+    direction of a plane between the bodies, (4,).
     """
 
     moving: int  # how many points the first body of each pair has
@@ -89,9 +90,10 @@ class Limits(Displayed):
 
     @cached_property
     def function(self) -> ca.Function:
-        """Return the function of all values, one below the other, of motions in {G} (18: pose, velocity, acceleration).
+        """Return the function of all values, one below the other.
 
-        Its inputs are those of the platform and of all carriers, tensions [N] (m) and the platform's offset (6).
+        Its inputs are the motion of the platform in {G} (18: pose, velocity, acceleration), those of all carriers (18
+        each), the tensions [N] (m) and the platform's offset from its path (6).
         """
         others = [self._state.tensions, self._state.off_path]
         return of_motions("limits", self._bodies, others, [ca.vertcat(*self._values)])
@@ -160,8 +162,9 @@ class Limits(Displayed):
     def along(
         self, platform: Motion, carriers: Motion, tensions: np.ndarray | None = None, off_path: np.ndarray | None = None
     ) -> list[np.ndarray]:
-        """Return the values of each limit along a motion of platform (n, 6) and carriers (n, c, 6) in {G}, (n, k).
+        """Return the values of each limit along a motion in {G}, (n, k).
 
+        - `platform`, `carriers`: pose, velocity and acceleration, (n, 6) each and (n, c, 6) each.
         - `tensions`: (n, m) [N]; where they are nan, so are the values that depend on them. Default: zeros.
         - `off_path`: offset of the platform from its path, (n, 6) [m, rad]. Default: zeros.
         """

@@ -14,10 +14,11 @@ ATTITUDES_MEET = 3  # rounds: where the cables leave a quadrotor depends on how 
 
 
 def initial_guess(scenario: Scenario, nodes: np.ndarray) -> Deviation:
-    """Return a guess that needs nothing from the user: thrusts balanced, tensions of least norm, cut to their limits.
+    """Return a guess that needs nothing from the user.
 
     Carriers that may go anywhere keep their positions relative to the platform, as at home, or draw together where the
-    task keeps them from obstacles (`formation`); others stay.
+    task keeps them from obstacles (`formation`); others stay. Quadrotors tilt as their thrust has to point. The
+    tensions are those of least norm, cut to their limits.
     """
     in_formation = formation_guess(scenario)
     return usual_guess(scenario, nodes) if in_formation is None else in_formation(nodes)

@@ -45,7 +45,8 @@ def interval_of(
 ) -> Part:
     """Return cost of jerk and constraints of one interval: integration, and limits at the Bernstein points.
 
-    They are for nodes of these `references`, (18 (1 + c), nodes); distances `on_the_way` hold from point to point.
+    The functions are for the nodes of these `references`, (18 (1 + c), nodes), with the distances that are kept
+    `on_the_way` from point to point.
     """
     robot, scheme = scenario.robot, scenario.scheme
     wide = 18 * (1 + len(robot.carriers))

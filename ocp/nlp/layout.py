@@ -19,7 +19,8 @@ DURATION, MARGIN = "duration", "margin"
 class Layout(Displayed):
     """The column of a point.
 
-    Each node has a copy of what all share, equal to that of the next node, so that the program stays banded.
+    Each node carries a copy of what all nodes share, the duration and the margin, equal to the copy of the next node,
+    so that the program stays banded.
     """
 
     # the number of free coordinates, and how many of these and their derivatives are unknowns

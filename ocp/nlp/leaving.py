@@ -60,9 +60,10 @@ def leaving(scenario: Scenario, layout: Layout, references: np.ndarray) -> list[
 
 
 def _slopes_outwards(scenario: Scenario, end: int, held: dict[Limit, Spans]) -> Iterator[tuple[str, ca.Function]]:
-    """Yield the limits of speed that are on a bound at an end, and how fast they leave it.
+    """Yield the names of the limits of speed that are on a bound at an end, and how fast they leave it.
 
-    The functions are of the motions of platform and carriers, (18, 1) each; `held` is that of `held_spans`.
+    Functions are of the motions of platform and carriers, (18, 1) each. `held` is when the task fixes what each limit
+    bounds.
     """
     limits, share = scenario.limits, 0.0 if end == 0 else 1.0
     if not any((share, share) in spans for spans in held.values()):

@@ -20,7 +20,11 @@ MOST_ITERATIONS = 150  # of a pass: those that end well take 10 to 90
 
 
 class LinearDistances:
-    """A true `program`, its solver, and the expressions that it needs about a motion; its points are at `shares`."""
+    """The program, its solver, and the expressions that it needs about a motion.
+
+    - `program`: the true program.
+    - `shares`: where its points are.
+    """
 
     def __init__(self, program: Program):
         self._program, self.shares = program, program.shares

@@ -31,8 +31,9 @@ def node_of(
 ) -> Part:
     """Return cost and constraints of one node: the balance A t = w and the limits that hold at an instant.
 
-    They are for nodes of these `references`, (18 (1 + c), nodes), with load, columns of the ground and extreme loads,
-    `carried` (10 + 6 s + 10 k, nodes), or nothing (0, nodes). Limits `on_the_way` are kept between nodes.
+    The functions are for the nodes of these `references`, (18 (1 + c), nodes), with the load and the columns of the
+    ground of each and extreme loads, `carried` (10 + 6 s + 10 k, nodes), or nothing (0, nodes). Limits `on_the_way`
+    are kept between nodes.
     """
     robot, dynamics = scenario.robot, scenario.dynamics
     x, duration = ca.SX.sym("x", layout.width), ca.SX.sym("duration")

@@ -54,7 +54,8 @@ def part_of(
 def function_of(name: str, unknowns: dict[str, ca.SX], parameters: dict[str, ca.SX], value: ca.SX) -> Differentiable:
     """Return the function of all unknowns and of those parameters on which its value depends.
 
-    CasADi would differentiate with respect to the parameters too: a Hessian took 6 times as long.
+    CasADi would differentiate with respect to the parameters too and throw the result away: a Hessian took 6 times as
+    long.
     """
     inputs = unknowns | {key: each for key, each in parameters.items() if ca.depends_on(value, each)}
     options = {"cse": True, "is_diff_in": [key in unknowns for key in inputs]}

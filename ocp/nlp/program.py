@@ -199,7 +199,7 @@ def build(
 
 
 def _values(references: np.ndarray, step: float) -> np.ndarray:
-    """Return the values of the parameters of a movable program."""
+    """Return the values of these parameters."""
     return np.append(references.ravel(order="F"), step)
 
 

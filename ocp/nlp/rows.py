@@ -140,7 +140,8 @@ def costs_at(
 ) -> tuple[ca.SX, ca.SX]:
     """Return what costs in column x, and the values whose rates cost, in amounts (`Costs.function`).
 
-    `duration` is that of the references [s], `bodies` are platform in {G} and carriers, (18, 1) each.
+    `duration` is that of the references [s], `bodies` are the motions of the platform in {G} and of the carriers,
+    (18, 1) each.
     """
     force, place = scenario.robot.force_scale, layout.at(MARGIN)
     margin = 0.0 if place is None else force * x[place]

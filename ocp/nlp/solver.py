@@ -152,10 +152,11 @@ class Solver:
     ) -> Outcome:
         """Solve from `guess`; default: from the last solution and its multipliers, or else from a guess of our own.
 
-        A guess is `coarser` if it is an optimum on a coarser mesh; one `near` the last solution starts with its
-        multipliers. After so many `seconds` IPOPT stops with the best. `parameters` are those of the program; default:
-        its own. Raises `SolverError` if CasADi or IPOPT break; `KeyboardInterrupt` if an interrupt arrives, and its
-        thread ends soon.
+        A guess is `coarser` if it is the same task's optimum on a coarser mesh. After so many `seconds` IPOPT
+        stops with the best that it has. A run without a solution is a result, not an error. `parameters` are
+        those of the program, if it has any; default: its own. A guess that is `near` the last solution starts
+        with its multipliers. Raises `SolverError` if CasADi or IPOPT break; `KeyboardInterrupt` if an interrupt
+        arrives; the solver's thread ends at its next iteration.
         """
         program, watch = self.program, self._watch
         start: dict[str, Any] = {"p": program.parameters if parameters is None else parameters}
@@ -201,7 +202,10 @@ class Solver:
 
 
 def check_progress(progress: Any) -> None:
-    """Raise InputError unless a user's `progress` is a function or None."""
+    """Check that a user's `progress` is a function or None.
+
+    Raises `InputError` if it is something else.
+    """
     if progress is not None and not callable(progress):
         accepted = "a function of (iteration, objective, infeasibility)"
         raise InputError(f"progress must be {accepted}, got {shown(progress)}")
@@ -216,10 +220,11 @@ def _checked(call: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
 
 
 class _Watch(ca.Callback):
-    """The iterations of the solver: each is reported, and the last of use stops it.
+    """Follow the iterations of the solver, report each, and stop it when going on is of no use.
 
-    Of no use are those of an abandoned run, those after the time is up, and those that no longer improve: IPOPT takes
-    long to be sure that no time is shorter, and moves on between equally good solutions where much costs nothing.
+    That is when its run is abandoned, when the time is up, or when the search has settled: a minimum time is often
+    reached long before IPOPT is sure that there is no shorter one, and where much costs nothing it moves on and on
+    between solutions that are as good as each other.
     """
 
     def __init__(self, program: Program):
@@ -306,8 +311,9 @@ class _Watch(ca.Callback):
 def run_in_one_thread() -> None:
     """Set the OpenBLAS that CasADi brings along to one thread; to be called after CasADi has loaded IPOPT.
 
-    The dense blocks of a factorisation are so small that more threads only wait: a team of six was planned 1.6 times as
-    fast with one. Other users of BLAS, and a number of threads that the environment gives, are not affected.
+    The dense blocks of a program's factorisation are so small that more threads only wait for each other: on two cores
+    a team of six was planned 1.6 times as fast with one, in a third of the processor time. Other users of BLAS are not
+    affected, and neither is a number of threads that the environment gives.
     """
     if any(name in os.environ for name in VARIABLES) or not hasattr(os, "RTLD_NOLOAD"):
         return

@@ -27,10 +27,13 @@ _arrived = threading.Event()
 
 
 def wait_for(work: Callable[[], Result], errands: Errands | None = None) -> Result:
-    """Return what `work` returns, computed in a thread of its own, which runs on if the wait ends early.
+    """Return what `work` returns, computed in a thread of its own.
 
-    `errands` that `work` puts are called in the caller's thread, in order. Raises `KeyboardInterrupt` if an interrupt
-    arrives meanwhile, and exceptions of `work` or of an errand.
+    - `work`: if the wait ends early, this is left to run: the process does not end before it does.
+    - `errands`: what `work` puts here is called in the caller's thread, in order, while it waits.
+
+    Raises `KeyboardInterrupt` if an interrupt arrives meanwhile. Exceptions of `work` or of an errand are raised as
+    well.
     """
     raise_if_swallowed()
     queue: Errands = SimpleQueue() if errands is None else errands
@@ -59,7 +62,8 @@ def wait_for(work: Callable[[], Result], errands: Errands | None = None) -> Resu
 def heeding() -> Iterator[None]:
     """Remember an interrupt that arrives in the block, and raise it no later than at the end of the block.
 
-    Nothing changes if the program has its own handler, or in threads other than the main one.
+    Nothing changes if the program has its own handler, or in threads other than the main one. Raises
+    `KeyboardInterrupt` if one was swallowed.
     """
     main = threading.current_thread() is threading.main_thread()
     if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:

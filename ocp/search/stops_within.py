@@ -116,7 +116,8 @@ def _between(short: Plan, enough: Plan | None, seconds: float, halfway: bool = F
 def _judged(plan: Plan, scenario: Scenario, seconds: float, suspects: Sequence[float] = ()) -> Plan:
     """Return a plan as one of the scenario's task, with its longest stop; not feasible if that takes too long.
 
-    Stops that begin at `suspects`, shares of the duration, come first: if one takes too long, they suffice.
+    With `suspects`, shares of the duration, stops that begin there and some others come first: if one takes too long,
+    the rest is not computed.
     """
     plan = replace(plan, scenario=replace(plan.scenario, task=scenario.task))
     if not plan.feasible:
