@@ -28,7 +28,7 @@ from ..models.trajectory import Motion, Trajectory
 from .continuation import RESTS, before, continued, faded, slopes
 
 SHORTEST, LONGEST = 0.1, 10.0  # the shortest stop [s], and the longest one over a usual one
-ATTEMPTS, FIRST, USUAL = 8, 4, 2.5  # durations, how many are tried first, and the least of these, of sqrt(length / g)
+ATTEMPTS, USUAL = 8, 2.5  # durations that are tried, all at once, and a usual one, of sqrt(length / g)
 CLOSE = 1.5  # times the least excess: of stops that break limits, the shortest with less is taken
 LEAST = 1.7  # times that carriers need at their largest acceleration: the rate falls up to 2.2 times its mean
 COARSE, FINE, APART = 24, 150, 0.01  # instants of an attempt, and at most of the result; [s] between those, at least
@@ -86,20 +86,8 @@ def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Team
     longest = min(LONGEST * max(usual, soonest), max(2 * left, soonest))
     durations = np.geomspace(soonest, longest, ATTEMPTS)
     durations, best = durations[durations < left], None
-    excess = np.full(len(durations), np.inf)
-
-    def attempt(first: int, end: int) -> None:
-        if some := durations[first:end].tolist():
-            tried = _Stops(robot, trajectory, begins, np.array(some), COARSE)
-            excess[first:end] = [each for each, _ in tried.worst]
-
     if len(durations):
-        middle = min(int(np.searchsorted(durations, usual)), max(len(durations) - FIRST, 0))
-        attempt(middle, middle + FIRST)
-        if excess[middle] == 0:
-            attempt(0, middle)
-        elif excess.min() > 0:
-            attempt(middle + FIRST, ATTEMPTS)
+        excess = np.array([each for each, _ in _Stops(robot, trajectory, begins, durations, COARSE).worst])
         duration = float(durations[np.argmax(excess <= CLOSE * excess.min())])
         # With more instants more is exceeded: where no attempt keeps the limits, the result does not either.
         for _ in range(AGAIN if excess.min() == 0 else not rests):
