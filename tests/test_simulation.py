@@ -40,7 +40,6 @@ LINES = {
     "wang-ctmrts": ([0.1, 0.05, 0.05], FREE),
     "wang-flying-quadrotor": ([0.5, 0, 0], FREE | {"margin": 0.3}),
     "multi-quadrotor-3": ([1.0, 0, 0], FREE),
-    "multi-quadrotor-4": ([1.0, 0, 0], FREE),
     "flycrane": ([0.5, 0, 0], FREE),
 }
 

@@ -88,7 +88,7 @@ def progress(*done):
 
 if __name__ == "__main__":
     robot = load("wang-flying")
-    simulate(robot, robot.home, wind=(3, 2, 0.5), gusts=1.0, duration=2, runs=40, workers={workers}, checkpoint="runs",
+    simulate(robot, robot.home, wind=(3, 2, 0.5), gusts=1.0, duration=1, runs=40, workers={workers}, checkpoint="runs",
              progress=progress)
 """
 
@@ -106,7 +106,7 @@ def test_few_long_runs_that_are_killed_keep_what_they_have(tmp_path, workers):
     process.stdout.close()
     assert 0 < stored < 40
     done = []
-    given = {"wind": (3, 2, 0.5), "gusts": 1.0, "duration": 2, "runs": 40}
+    given = {"wind": (3, 2, 0.5), "gusts": 1.0, "duration": 1, "runs": 40}
     resumed = simulate(
         ROBOT, ROBOT.home, **given, checkpoint=tmp_path / "runs", resume=True, progress=lambda *now: done.append(now[0])
     )

@@ -1,23 +1,48 @@
 """Functional mock-up units for tests: written once, and run by FMPy."""
 
+import hashlib
+import subprocess
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from towline import export_fmu
+from towline.export.fmu import export
 
 from .c_programs import require
 from .once import made_once
 
 
 def written(factory: pytest.TempPathFactory, robot: str, part: str, drive: str | None = None) -> Path:
-    """Write a unit of a robot once for all tests, at home, without optimisation, which changes no bit."""
+    """Write a unit of a robot once for all tests, at home, without optimisation, which changes no bit.
+
+    Sources that units share are compiled once.
+    """
     require("cc")
+
+    def run(command: list[str], **options: Any) -> Any:
+        sources, others = (
+            [each for each in command if each.endswith(".c") == is_source] for is_source in (True, False)
+        )
+        flags = others[: others.index("-lm")]
+
+        def compiled(source: str) -> str:
+            def make(folder: Path) -> None:
+                compiler = [each for each in flags if each != "-shared"]
+                subprocess.run([*compiler, "-c", source, "-o", str(folder / "object.o")], check=True)
+
+            digest = hashlib.sha256(Path(source).read_bytes()).hexdigest()
+            return str(made_once(factory, f"fmu-{digest}", make) / "object.o")
+
+        return subprocess.run([*flags, *map(compiled, sources), *others[len(flags) :]], **options)
 
     def make(folder: Path) -> None:
         with pytest.MonkeyPatch.context() as patch:
             patch.setenv("CFLAGS", "-O0")
+            patch.setattr(export, "subprocess", SimpleNamespace(run=run))
             export_fmu(robot, folder / "unit.fmu", part, drive)
 
     return made_once(factory, f"fmu-{robot}-{part}-{drive}", make) / "unit.fmu"
