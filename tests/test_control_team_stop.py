@@ -200,9 +200,8 @@ def test_the_rest_of_a_plan_for_stronger_rotors_is_no_feasible_stop(made):
     assert weak.excess == pytest.approx(1 / 0.9 - 1, rel=0.02)
 
 
-@pytest.mark.parametrize("depth", [0.0, 0.1])
-def test_carriers_with_two_cables_keep_the_path_of_their_hooks(depth):
-    robot = hooked_below(depth)
+def test_carriers_with_two_cables_keep_the_path_of_their_hooks():
+    robot = hooked_below(0.1)
     line = {"path": {"kind": "line", "start": [0, 0, 0], "end": [1.5, 0, 0.2]}, "duration": 3.0}
     found = plan(robot, {**line, "base": {"kind": "free"}})
     assert found.feasible

@@ -357,7 +357,7 @@ def test_mutated_files_are_read_or_refused_in_one_line(name, tmp_path):
     content, draw, refused = path.read_bytes(), np.random.default_rng(7), 0
     start = time.process_time()
     tracemalloc.start()
-    for _ in range(50):
+    for _ in range(30):
         data = bytearray(content)
         for _ in range(draw.integers(1, 12)):
             at, size = int(draw.integers(len(data) - 8)), int(draw.integers(1, 9))
