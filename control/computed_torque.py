@@ -194,6 +194,7 @@ class ComputedTorque(Controller):
         self._late: np.ndarray | None = None  # motions when they were measured, if that is not now
         self._accelerations = bytes(8 * rows * count * 6)  # of carriers, as ordered last
         self._last = bytes(8 * rows * m)  # tensions that were commanded last
+        self._otherwise = np.zeros((rows, m))  # measured minus commanded tensions, over the age of states [N]
         self._measured, self._wanted = np.zeros((rows, 1 + count, 12)), np.zeros((rows, 18))
         self._carriers = np.zeros((rows, count, 3, 6))  # how they should move
         self._cables, self._platform = np.zeros((rows, m), CABLE), np.zeros(rows, PLATFORM)
@@ -291,11 +292,14 @@ class ComputedTorque(Controller):
             state, reference = self._as_floats(state, reference)
             control_step(0.0, 0.0, *scales, TAKE_ALONE, state, reference, *own, None, *self._arrays)
             cables, age = self._cables, time - seen
-            otherwise = cables["known"] - cables["then"]
+            # What differs from commands is taken to stay, which is true of what changes more slowly than the age. With
+            # more, ages that are not quite as told would make the loop unstable.
+            share = min(since / age, 1.0) if age > ROUNDING else 1.0
+            self._otherwise += share * (cables["known"] - cables["then"] - self._otherwise)
             self._sent_lately.remember(self._last, dt)
             self._sent_lately.commanded(cables, age, since, dt, self._senses)
             models = self._carried.records_between(seen, time)
-            memory = self._measured, otherwise, self._platform["disturbance"], self._accelerations
+            memory = self._measured, self._otherwise, self._platform["disturbance"], self._accelerations
             late = self._sent_lately.move_on(age, models, *memory)
             seen_so = self._measured.copy() if late is None else late
             fixed = dt, since if observes else 0.0, *scales, solves

@@ -91,6 +91,26 @@ def test_reports_that_come_with_their_time_cost_little(circle, case, standard, a
     assert 1e3 * fly(task, Predictive(task.robot, reach=task.reach), **late).rms < ahead
 
 
+@pytest.mark.parametrize("told", [0.7, 1.3])
+def test_a_delay_that_is_told_wrong_by_a_third_costs_that_third(circle, told):
+    """Of 30 ms: 0.3 times speed and delay. Measured tensions, extrapolated as they are, would be a loop at 55 Hz."""
+    task, speed, made = shorter(circle, 900), 0.2 * np.pi, []
+
+    def mistimed(kind):
+        class Mistimed(kind):
+            def step(self, time, state, reference):
+                return super().step(time, state._replace(time=time - told * (time - state.time)), reference)
+
+        return Mistimed(task.robot, reach=task.reach)
+
+    for kind in (ComputedTorque, Predictive):
+        made.append(controller := mistimed(kind))
+        flown = fly(task, controller, delay=0.03, stamped=True)
+        assert flown.error[-300:].max() < 1.1 * 0.3 * speed * 0.03
+        assert (flown.answered == 0).all()
+    assert made[1].handed_over is None
+
+
 def test_reports_at_fifty_hertz_leave_quick_observers_stable():
     """A report is of the last period. With the command's mean over all 20 ms, 40 rad/s are 0.9 m off after 2 s."""
     pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")
