@@ -190,12 +190,15 @@ def test_gradients_are_slopes_of_the_cost(name):
     model = Model(Parameters(robot, groups), log, {}, np.ones((robot.m, count)), felt=felt)
     state = model.begin()._replace(errors=draw.normal(size=(count, 2)))
     model.parameters.table(state.x)[:, 10:13] = 1e-6, 0.05, 1.0
+    varies, last = model.parameters.varies, model.parameters.clock
+    state.x[last + 5 :] = 0.3 * draw.normal(size=12) * varies[last + 5 :]  # the frames of the poses
     residuals, derivatives = model.linearised(state)
     exact = np.einsum("nip,ni->p", derivatives.balance.by_parameters, residuals.balance)
+    exact[last:][varies[last:]] += np.einsum("mn,mnk->k", residuals.readings, derivatives.others)
     for i in range(robot.m):
         exact[i * OF_CABLE : (i + 1) * OF_CABLE] += residuals.readings[i] @ derivatives.cables[i]
-    for column in np.flatnonzero(model.parameters.varies):
-        step = 1e-6 * np.eye(len(state.x))[column] * (1e-6 if column % OF_CABLE == 10 else 1.0)
+    for column in np.flatnonzero(varies):
+        step = 1e-6 * np.eye(len(state.x))[column] * (1e-6 if column < last and column % OF_CABLE == 10 else 1.0)
         more, less = (model.cost(state._replace(x=state.x + sign * step)) for sign in (1, -1))
         assert (more - less) / (4 * step.max()) == pytest.approx(exact[column], rel=1e-3, abs=1e-4 * abs(exact).max())
     of_pose = np.einsum("mnc,mn->nc", derivatives.poses, residuals.readings)

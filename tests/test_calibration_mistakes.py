@@ -12,7 +12,7 @@ from towline.estimation.logs.clocks import realigned
 from towline.models import Dynamics, load, points
 
 from .recorded import motion, quaternions
-from .robots_as_built import moved_anchors, random_poses
+from .robots_as_built import as_built, moved_anchors, random_poses
 from .user_recordings import FRAME, PLATFORM, lengths_at, robot_file
 from .warm import towline
 
@@ -258,6 +258,22 @@ def test_the_command_mends(tmp_path):
         assert told["notes"][0].startswith(f"corrected: {text}")
         assert told["residual_after"] < 1.2e-3
         (tmp_path / "mine.yaml").unlink()
+
+
+def test_standard_deviations_include_the_error_of_a_frame_that_was_found():
+    """The file's anchors are 2 cm off, so the frame is too: taken as exact, errors would be 5 standard deviations."""
+    z = []
+    for seed in range(6):
+        built = as_built(60, seed)
+        lost = Rotation.from_euler("zyx", [80, 3, -5], degrees=True)
+        fixed, texts = corrected("cogiro", Measurements(built.readings, seen(built.poses, ([1, -2, 0.5], lost))))
+        result = calibrate("cogiro", fixed)
+        assert len(texts) == 1
+        assert result.free == ("anchors", "offsets", "frame")
+        assert "include its error" in result.report()
+        true = dict(zip(result.identifiable[:3], built.robot.anchors[0], strict=False))
+        z += [(one.value - true[one.name]) / one.sigma for one in result.parameters if one.name in true]
+    assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.6  # 18 numbers, nearly six of them independent
 
 
 @pytest.mark.parametrize("what", ["frame turned", "cables reversed"])

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.fft import next_fast_len
 
 from .model import Model, State
-from .parameters import OF_CABLE
+from .parameters import OF_CABLE, OF_ROBOT
 from .projection import Part, equations_of, parts
 from .sightings import SEEN
 
@@ -161,12 +161,13 @@ def _kinds(part: Part, root: np.ndarray) -> Iterator[_Kind]:
             poses = forces.by_pose * model.poses_vary[:, None] @ np.swapaxes(inverse_root, 1, 2)
             H = H - poses @ Y
         yield _Kind.of(H @ root, forces.residuals, np.ones_like(forces.residuals), poses)
-    if seen is None or seen.cables is None or seen.clock is None or seen.poses is None:
+    if seen is None or seen.cables is None or seen.robot is None or seen.poses is None:
         return
     found: list[tuple[np.ndarray, np.ndarray]] = []
     for i, e in enumerate(seen.residuals):
         J, R = np.zeros((*e.shape, model.parameters.count)), np.zeros((*e.shape, 6))
-        J[..., i * OF_CABLE + np.array(SEEN)], J[..., model.parameters.clock] = seen.cables[i], seen.clock[i]
+        J[..., i * OF_CABLE + np.array(SEEN)] = seen.cables[i]
+        J[..., model.parameters.clock : model.parameters.clock + OF_ROBOT] = seen.robot[i]
         J = J[..., varies] / scale[varies]  # (n, 3, p)
         if inverse_root is not None and Y is not None:
             R = (seen.poses[i] * model.poses_vary[:, None, :6]) @ np.swapaxes(inverse_root[:, :, :6], 1, 2)

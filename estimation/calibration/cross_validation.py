@@ -44,7 +44,17 @@ CHANCE = 3.0  # times the logarithm of the number of residuals, by which a param
 WORSE = 1.02  # of the smallest error left out that a smaller set of parameters may have
 CLEANED = {"anchors", "offsets", "clock"}  # found while wrong readings are looked for
 FORCES = ("mass", "com", "capstan", "friction", "zeros")  # of which auto selects
-ALWAYS = ("clock", "mass", "com", "capstan", "friction", "gains", "zeros")  # groups that the sets of a comparison share
+ALWAYS = (
+    "clock",
+    "frame",
+    "body",
+    "mass",
+    "com",
+    "capstan",
+    "friction",
+    "gains",
+    "zeros",
+)  # groups that the sets of a comparison share
 CERTAIN = 3.0  # standard deviations that a clock offset must differ from 0
 NESTED: tuple[tuple[str, ...], ...] = (
     (),
@@ -130,7 +140,8 @@ def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[st
     if turns is not None and not turns.enough:
         sets = [one for one in sets if "attachments" not in one]
     check_enough(robot, measurements, ("offsets",), {})
-    clock = ("clock",) if "clock" in usual(robot, measurements) else ()
+    always = measurements.framed
+    clock = (*always, *(("clock",) if "clock" in usual(robot, measurements) else ()))
     first = [one for one in sets if one and set(one) <= CLEANED and is_enough(robot, measurements, (*one, *clock))][-1]
     solved = solve(robot, measurements, (*first, *clock), {}, outliers)
     if clock and not CERTAIN * _clock_sigma(solved) < abs(solved.fit.state.x[solved.model.parameters.clock]):

@@ -3,6 +3,7 @@
 A motion capture measures the pose X of some body in some frame; the file's pose is T X B with the pose T of its frame
 in {G} and the pose B of the platform frame in the body. Both are fitted to the cable lengths with the file's anchors
 and attachments, up to the offsets of the readings (and scales of counts), from all turns of the axes by right angles.
+Coordinates that a robot cannot change are as at home, so a planar robot's poses are in its plane.
 """
 
 from collections.abc import Sequence
@@ -13,8 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from ...base.text import quantity, quantity_row
 from ...models import points
+from ...models.robot import Robot
 from .differences import AS_GIVEN, LogPart
-from .geometry import runs
+from .geometry import length_of, runs
 from .interpretations import Interpretation, interpretations
 
 FEW, MANY = 6, 60  # steps of a first and of a last descent
@@ -35,6 +37,12 @@ class Frames(NamedTuple):
     def of(self, position: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the positions (N, 3) and rotations (N, 3, 3) of the platform frame in {G}."""
         return _placed((*self.outer, *self.inner), position, rotation)
+
+    @property
+    def found(self) -> tuple[str, ...]:
+        """Return the parameters of a calibration that are the errors of these frames: "frame", "body", or both."""
+        parts = (("frame", self.outer), ("body", self.inner))
+        return tuple(name for name, (shift, turn) in parts if shift.any() or (turn != np.eye(3)).any())
 
     def __str__(self) -> str:
         texts: list[str] = []
@@ -143,7 +151,7 @@ def _descended(log: LogPart, starts: Sequence[Frames], which: tuple[bool, bool],
         going = going[np.where(better, np.abs(step).max(axis=1) >= 1e-7, damping[going] <= 1e6)]
         if not going.size:
             break
-    sizes = 1.4826 * np.median(np.abs(now[0]), axis=1)
+    sizes = 1.4826 * np.median(np.abs(now[0][:, : log.y.size]), axis=1)
     return [Frames((t, T), (b, B), float(size)) for t, T, b, B, size in zip(*frames, sizes, strict=True)]
 
 
@@ -164,9 +172,10 @@ def _placed(frames: Sequence[np.ndarray], position: np.ndarray, rotation: np.nda
 
 
 def _residuals(log: LogPart, frames: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Return lengths minus readings up to offsets, and scales if `log.counted`, (S, m N) [m].
+    """Return lengths minus readings up to offsets, and scales if `log.counted`, (S, k N) [m], k = m with all freedoms.
 
-    The second result has the derivatives by shifts and turns, (S, m N, 12).
+    Of robots with locked coordinates, their values less those at home follow. The second result has the derivatives by
+    shifts and turns, (S, k N, 12).
 
     - `frames`: t (S, 3), T (S, 3, 3), b and B.
     """
@@ -174,11 +183,15 @@ def _residuals(log: LogPart, frames: Sequence[np.ndarray]) -> tuple[np.ndarray, 
     x, R = _placed(frames, log.position, log.rotation)  # (S, N, 3), (S, N, 3, 3)
     run = runs(log.robot, log.table, x.reshape(-1, 3), R.reshape(-1, 3, 3))
     shape = (log.robot.m, *x.shape[:2])
+    locked, by_locked = _locked(log.robot, x, R)
     by_pose = run.by_pose.reshape(*shape, 2, 3).swapaxes(0, 1)  # by shift and turn of the platform, (S, m, N, 2, 3)
+    by_pose = np.concatenate([by_pose, by_locked], axis=1)  # (S, k, N, 2, 3)
     own = by_pose @ (T[:, None] @ log.rotation)[:, None]  # likewise in the body's axes
+    m = log.robot.m
     # A turn of the measured frame is about its origin.
     about_frame = by_pose[..., 1, :] + np.cross((x - t[:, None])[:, None], by_pose[..., 0, :])
-    J = np.concatenate([by_pose[..., 0, :], about_frame, own.reshape(*own.shape[:3], 6)], axis=3)  # (S, m, N, 12)
+    J = np.concatenate([by_pose[..., 0, :], about_frame, own.reshape(*own.shape[:3], 6)], axis=3)  # (S, k, N, 12)
+    J, J_locked = J[:, :m], J[:, m:]
     e = run.lengths.reshape(shape).swapaxes(0, 1) - (0.0 if log.counted else log.y.T)
     unknown = ~np.isfinite(e + J.sum(axis=3))
     e[unknown], J[unknown] = 1e3, 0.0
@@ -189,4 +202,29 @@ def _residuals(log: LogPart, frames: Sequence[np.ndarray]) -> tuple[np.ndarray, 
         e -= np.einsum("smn,nm->sm", e, y)[..., None] * y.T
         J -= np.einsum("smnk,nm->smk", J, y)[:, :, None] * y.T[..., None]
     e -= np.median(e, axis=2, keepdims=True)
+    e, J = np.concatenate([e, locked], axis=1), np.concatenate([J, J_locked], axis=1)
     return e.reshape(len(t), -1), J.reshape(len(t), -1, 12)
+
+
+def _locked(robot: Robot, x: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return locked coordinates of poses less their values at home, (S, c, N) [m], with turns as lengths.
+
+    The second result has the derivatives by shift and turn of the platform, (S, c, N, 2, 3).
+
+    - `x`, `R`: positions (S, N, 3) and rotations (S, N, 3, 3).
+    """
+    moves, axes, length = robot.dof_mask > 0, np.eye(3), length_of(robot)
+    apart = R @ points.rotations(robot.home[3:]).T  # turns from home
+    values, derivatives = [], []
+    for axis in np.flatnonzero(~moves[:3]):
+        values.append(x[..., axis] - robot.home[axis])
+        derivatives.append(np.broadcast_to([axes[axis], np.zeros(3)], (*x.shape[:2], 2, 3)))
+    free = np.flatnonzero(moves[3:])
+    turned = [(i, free[0]) for i in range(3) if i != free[0]] if len(free) == 1 else [(1, 0), (2, 0), (2, 1)]
+    for i, axis in turned if len(free) < 2 else ():
+        values.append(length * apart[..., i, axis])
+        by_turn = length * np.cross(apart[..., axis], axes[i])
+        derivatives.append(np.stack([np.zeros_like(by_turn), by_turn], axis=2))
+    if not values:
+        return np.zeros((len(x), 0, x.shape[1])), np.zeros((len(x), 0, x.shape[1], 2, 3))
+    return np.stack(values, axis=1), np.stack(derivatives, axis=1)

@@ -35,7 +35,8 @@ from ..logs.pose_track import PoseTrack
 from .balance import Balance, Balanced, FeltTensions, needs_balance
 from .carrier_motion import CarrierMotion
 from .geometry import runs
-from .parameters import IN_BALANCE, OF_CABLE, OF_ROBOT, Parameters, normal_rows, prior_sigmas
+from .parameters import FRAMES, IN_BALANCE, OF_CABLE, OF_ROBOT, Parameters, normal_rows, prior_sigmas
+from .pose_frames import Poses, reframed, twists_of
 from .sightings import Sighted, sightings
 
 STILL = 1e-4  # [m] along directions that are kept
@@ -91,7 +92,7 @@ class Derivatives(NamedTuple):
     """Derivatives of the residuals of readings, and balance and directions, where measured, with their own."""
 
     cables: np.ndarray  # derivatives by the parameters of the cable itself, (m, N, 15)
-    others: np.ndarray  # derivatives by the parameters of the robot and slips, (m, N, 5 + slips)
+    others: np.ndarray  # derivatives by the parameters of the robot and slips that vary, (m, N, k)
     # derivatives by shift and rotation of the sample itself, and errors of its tensions, (m, N, 6 + d)
     poses: np.ndarray
     # R b of each cable (m, N, 3) [m], and its length (m, N) [m]
@@ -246,7 +247,7 @@ class Model(Displayed):
 
     def poses(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Return positions (N, 3) [m] and rotations (N, 3, 3) of the platform."""
-        position, rotation, _, _ = self._base(state.x[self.parameters.clock])
+        position, rotation, _, _ = self._base(state.x)
         return position + state.shift, state.turn @ rotation
 
     def inside(self, state: State) -> np.ndarray:
@@ -255,10 +256,10 @@ class Model(Displayed):
             return np.ones(len(self.measurements), dtype=bool)
         return self.track.inside(state.x[self.parameters.clock])
 
-    def _base(self, clock: float) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]:
-        if self.track is not None:
-            return self.track.at(clock)
-        return (*self._begun, None, None)
+    def _base(self, x: np.ndarray) -> Poses:
+        base = (*self._begun, None, None) if self.track is None else self.track.at(x[self.parameters.clock])
+        change = x[self.parameters.clock :][FRAMES]
+        return reframed(base, change, self.robot.home[:3]) if change.any() else base
 
     @cached_property
     def _begun(self) -> tuple[np.ndarray, np.ndarray]:
@@ -296,8 +297,8 @@ class Model(Displayed):
     def _evaluate(self, state: State, derive: bool) -> tuple[Residuals, Derivatives | None]:
         robot, parameters = self.robot, self.parameters
         table, m = parameters.table(state.x), robot.m
-        base_position, base_rotation, velocity, rate = self._base(state.x[parameters.clock])
-        position, rotation = base_position + state.shift, state.turn @ base_rotation
+        base = _, _, velocity, _ = self._base(state.x)
+        position, rotation = base[0] + state.shift, state.turn @ base[1]
         arms = np.matmul(table[:, None, None, 3:6], np.swapaxes(rotation, 1, 2))[:, :, 0]  # (m, N, 3), R b
         moving = None if self.carriers is None else self.carriers.at(state.x[parameters.clock])
         at = carriers_of(robot, self.measurements) if moving is None else moving.poses
@@ -345,17 +346,18 @@ class Model(Displayed):
         cables[..., 10] = by_strain * tensions
         cables[..., 11:] = 0.0
         by_errors = (by_strain * table[:, 10:11])[..., None] * by_errors
-        others = np.zeros((m, len(position), OF_ROBOT + len(parameters.slips)))
-        if velocity is not None and rate is not None:
-            twist = np.concatenate([velocity, rate], axis=1)
-            others[..., 0] = np.einsum("mni,ni->mn", by_pose, twist)
+        last = np.flatnonzero(parameters.varies[parameters.clock :])
+        moved, others = last[last < OF_ROBOT], np.zeros((m, len(position), len(last)))
+        if velocity is not None or (moved >= FRAMES.start).any():
+            twists = twists_of(base, state.x[parameters.clock :][FRAMES], robot.home[:3], moved, state.turn)
+            others[..., : len(moved)] = np.swapaxes(np.swapaxes(by_pose, 0, 1) @ twists, 0, 1)
             if forces is not None and forces.by_parameters is not None and forces.by_pose is not None:
-                forces.by_parameters[..., parameters.clock] += (forces.by_pose @ twist[..., None])[..., 0]
-            if seen is not None and seen.clock is not None and seen.poses is not None:
-                seen.clock[...] += (seen.poses @ twist[..., None])[..., 0]
+                forces.by_parameters[..., parameters.clock + moved] += forces.by_pose[..., :6] @ twists
+            if seen is not None and seen.robot is not None and seen.poses is not None:
+                seen.robot[..., moved] += seen.poses @ twists
             if carried is not None:
-                others[..., 0] -= np.einsum("mni,mni->mn", by_pose[..., :3], carried[0])
-        for column, (cable, first) in enumerate(parameters.slips, start=OF_ROBOT):
+                others[..., last == 0] -= np.einsum("mni,mni->mn", by_pose[..., :3], carried[0])[..., None]
+        for column, (cable, first) in enumerate(parameters.slips, start=len(moved)):
             others[cable, first:, column] = -gain[cable, first:]
         forces = self._kept(forces, weighs)
         if self._open:

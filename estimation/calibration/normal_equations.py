@@ -24,7 +24,7 @@ from ..pose.estimate import unbounded
 from .curvature import curvature
 from .geometry import length_of
 from .model import STILL, Derivatives, Model, Residuals, State
-from .parameters import OF_CABLE
+from .parameters import OF_CABLE, OF_ROBOT
 from .products import inner
 from .sightings import SEEN
 
@@ -52,7 +52,8 @@ def metric(model: Model) -> np.ndarray:
     length = length_of(model.robot)
     table[:, 9], table[:, 10] = spread**2, force * length
     table[:, 11:] = length, length / force, length, length / force
-    of_robot = (speed, length / model.robot.platform.mass, 1.0, 1.0, 1.0)
+    moved = (1.0, 1.0, 1.0, length, length, length) * 2
+    of_robot = (speed, length / model.robot.platform.mass, 1.0, 1.0, 1.0, *moved)
     return np.concatenate([table.ravel(), of_robot, np.ones(len(parameters.slips))])
 
 
@@ -175,7 +176,7 @@ class _Layer(NamedTuple):
             full[own, own] += blocks[i]
             full[own, m * width :] += cross[i]
             full[m * width :, own] += cross[i].T
-        flat = self.others.reshape(-1, self.others.shape[2])
+        flat = self.others.reshape(self.e.size, self.others.shape[2])
         full[m * width :, m * width :] += inner(flat, flat)
         right[: m * width] += inner(self.J, self.e[..., None]).ravel()
         right[m * width :] += inner(flat, self.e.reshape(-1, 1))[:, 0]
@@ -186,7 +187,8 @@ class _Layer(NamedTuple):
         width = self.J.shape[2]
         G = np.ascontiguousarray(self.poses.transpose(1, 3, 0, 2)) * vary[:, :size, None, None]  # (N, 6, m, k)
         J = np.ascontiguousarray(self.J.reshape(m, count, k, width).swapaxes(0, 1))  # (N, m, k, width)
-        others = np.moveaxis(self.others.reshape(m, count, k, -1), 0, 1).reshape(count, m * k, -1)
+        more = self.others.shape[2]
+        others = np.moveaxis(self.others.reshape(m, count, k, more), 0, 1).reshape(count, m * k, more)
         E = np.empty((count, size, m * width + others.shape[2]))
         of_cables = E[..., : m * width].reshape(count, size, m, width)  # a view
         np.multiply(G[..., 0, None], J[:, None, :, 0], out=of_cables)
@@ -204,19 +206,20 @@ def _layers(
     flags, factors = parameters.table(parameters.varies), parameters.table(scale)
     used = np.flatnonzero(flags.any(axis=0))
     J = derivatives.cables[..., used] / factors[:, None, used]
-    last = slice(parameters.clock, parameters.count)
-    others = derivatives.others / scale[last]
-    keep = np.concatenate([flags[:, used].ravel(), parameters.varies[last]])
+    last = np.flatnonzero(parameters.varies[parameters.clock :])
+    others = derivatives.others / scale[parameters.clock + last]
+    keep = np.concatenate([flags[:, used].ravel(), np.ones(len(last), dtype=bool)])
     layers = [_Layer(J, others, residuals.readings, derivatives.poses[:, :, None])]
     seen = derivatives.directions
-    if seen is not None and seen.cables is not None and seen.clock is not None and seen.poses is not None:
+    if seen is not None and seen.cables is not None and seen.robot is not None and seen.poses is not None:
         m, count = seen.residuals.shape[:2]
-        own, more = np.zeros((m, count, 3, len(used))), np.zeros((m, count, 3, others.shape[2]))
+        own, of_robot = np.zeros((m, count, 3, len(used))), last[last < OF_ROBOT]
         for place, column in enumerate(used):
             if column in SEEN:
                 own[..., place] = seen.cables[..., SEEN.index(column)] / factors[:, None, None, column]
-        more[..., 0] = seen.clock / scale[parameters.clock]
-        own, more = (part.reshape(m, 3 * count, -1) for part in (own, more))
+        more = np.zeros((m, count, 3, len(last)))  # of slips as well
+        more[..., : len(of_robot)] = seen.robot[..., of_robot] / scale[parameters.clock + of_robot]
+        own, more = (part.reshape(m, 3 * count, part.shape[3]) for part in (own, more))
         layers.append(_Layer(own, more, seen.residuals.reshape(m, -1), seen.poses))
     return layers, keep
 

@@ -122,7 +122,8 @@ def _generators(parameters: Parameters, state: State) -> Iterator[tuple[str, np.
                 yield f"all {what} together {word} {axis} of {frame}", change(*both)
     size, of_tensions = state.x.copy(), parameters.table(state.x)[:, 10:]
     size[parameters.clock : parameters.clock + 2] = 0.0
-    size[parameters.clock + 2 : parameters.clock + OF_ROBOT] *= "com" in parameters.groups
+    size[parameters.clock + 2 : parameters.clock + 5] *= "com" in parameters.groups
+    size[parameters.clock + 5 : parameters.clock + OF_ROBOT] = 0.0
     parameters.table(size)[:, :3] = np.einsum("mji,mj->mi", turned, anchors - middle)
     parameters.table(size)[:, 10:] = 0.0
     yield "the overall scale: no length is known for certain", size

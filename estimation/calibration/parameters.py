@@ -1,9 +1,11 @@
 """Parameters of a calibration: their names, and conversion from and to a robot.
 
-The vector x has fifteen numbers for each cable, in this order, then five of the robot, then one for each slip:
+The vector x has fifteen numbers for each cable, in this order, then seventeen of the robot, then one for each slip:
 
     anchor x y z  attachment x y z  offset  scale  radius  build-up  compliance  capstan  friction  gain  zero
-    clock  mass  com x y z
+    clock  mass  com x y z  frame: shift x y z, turn x y z  body: shift x y z, turn x y z
+
+Frame and body are the changes of measured poses in `pose_frames`.
 
 With the measured tension y of a cable and the sign s of its speed (1: paid out), the platform feels the tension
 exp(capstan s) gain (y - zero) + friction s, and compliance is 1 / (E A).
@@ -24,13 +26,14 @@ from ...models.parameters import ENCODER
 from ...models.robot import Robot
 
 OF_CABLE = 15  # parameters of a cable
-OF_ROBOT = 5  # clock offset, mass and CoM
-GEOMETRY = ("anchors", "attachments", "offsets", "scales", "radii", "build-up", "clock")
+OF_ROBOT = 17  # clock offset, mass, CoM, and changes of the frames of measured poses
+FRAMES = slice(5, 17)  # of these, the last ones
+GEOMETRY = ("anchors", "attachments", "offsets", "scales", "radii", "build-up", "clock", "frame", "body")
 IN_BALANCE = ("mass", "com", "capstan", "friction", "gains", "zeros")  # that only the balance of forces determines
 GROUPS = (*GEOMETRY, "stiffness", *IN_BALANCE)
 COLUMNS = {"anchors": (0, 1, 2), "attachments": (3, 4, 5), "offsets": (6,), "scales": (7,), "radii": (8,)}
 COLUMNS |= {"build-up": (9,), "stiffness": (10,), "capstan": (11,), "friction": (12,), "gains": (13,), "zeros": (14,)}
-ROBOT_COLUMNS = {"clock": (0,), "mass": (1,), "com": (2, 3, 4)}
+ROBOT_COLUMNS = {"clock": (0,), "mass": (1,), "com": (2, 3, 4), "frame": range(5, 11), "body": range(11, 17)}
 WORDS = (
     *(f"{end}.{axis}" for end in ("anchor", "attachment") for axis in "xyz"),
     *("offset", "scale", "pulley.radius", "build-up", "compliance", "capstan", "friction", "gain", "zero"),
@@ -70,19 +73,24 @@ class Parameters(Displayed):
             flags[:, COLUMNS.get(group, ())] = True
         flags[:, 8] &= self.robot.pulley_radii > 0
         robot = np.repeat([group in self.groups for group in ROBOT_COLUMNS], list(map(len, ROBOT_COLUMNS.values())))
+        moves = self.robot.dof_mask > 0
+        plane = [moves[[*{0, 1, 2} - {axis}]].all() for axis in range(3)]  # in which positions turn about the axis
+        robot[FRAMES] &= np.concatenate([moves[:3], moves[3:] | plane, moves])
         return np.concatenate([flags.ravel(), robot, np.ones(len(self.slips), dtype=bool)])
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Return the names of all parameters."""
         cables = [f"cables[{i}].{word}" for i in range(self.robot.m) for word in WORDS]
-        robot = ("clock", "mass", *(f"com.{axis}" for axis in "xyz"))
+        moved = (f"{of}.{how}.{axis}" for of in ("frame", "body") for how in ("shift", "turn") for axis in "xyz")
+        robot = ("clock", "mass", *(f"com.{axis}" for axis in "xyz"), *moved)
         return (*cables, *robot, *(f"cables[{i}].slip at sample {k}" for i, k in self.slips))
 
     @cached_property
     def units(self) -> tuple[str, ...]:
         """Return the units of all parameters."""
-        return (*(UNITS * self.robot.m), "s", "kg", *("m",) * 3, *("m" for _ in self.slips))
+        of_frames = ("m", "m", "m", "rad", "rad", "rad") * 2
+        return (*(UNITS * self.robot.m), "s", "kg", *("m",) * 3, *of_frames, *("m" for _ in self.slips))
 
     @cached_property
     def first(self) -> np.ndarray:
@@ -93,7 +101,7 @@ class Parameters(Displayed):
         table[:, list(ENCODED)] = robot.encoders
         table[:, 10] = [1 / cable.stiffness if cable.stiffness else 0.0 for cable in robot.cables]
         table[:, 13] = 1.0
-        of_robot = (0.0, robot.platform.mass, *robot.platform.com)
+        of_robot = (0.0, robot.platform.mass, *robot.platform.com, *np.zeros(12))
         return np.concatenate([table.ravel(), of_robot, np.zeros(len(self.slips))])
 
     @cached_property
@@ -128,7 +136,7 @@ class Parameters(Displayed):
                 cable["stiffness"] = 1 / row[10] if row[10] > STIFFEST else None
             if "friction" in self.groups and cable["winch"] is not None:
                 cable["winch"]["friction"] = max(row[12], 0.0)
-        _, mass, *com = x[self.clock : self.clock + OF_ROBOT].tolist()
+        mass, *com = x[self.clock + 1 : self.clock + 5].tolist()
         data["platform"] |= {"mass": mass, "com": com}
         encoded = [cable["encoder"] is not None and self.robot.fixed_lengths is None for cable in data["cables"]]
         data["uncertainty"] = None if covariance is None else self._uncertainty(covariance, encoded)

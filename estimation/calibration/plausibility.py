@@ -142,7 +142,8 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
             elif way.weighted * way.way.factor < left_before and way.size < EXPLAINED * change:
                 text = _in_frame(frames._replace(size=way.size), as_given)
                 text = ", and ".join(filter(None, (way.text, read.text, text)))
-                return Mistake(text, _corrected(given, (*moved, None), way.columns, factors), factors=factors)
+                corrected = _corrected(given, (*moved, None), way.columns, factors, frames.found)
+                return Mistake(text, corrected, factors=factors)
     if named:
         factors = best.signs * best.way.factor
         # Fitted scales reduce the differences of any log; the remainder may be due to a wrong explanation.
@@ -159,9 +160,8 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
 
 
 def _in_frame(frames: Frames, before: float) -> str:
-    """Return the error of poses in another frame, with what it means for a calibration."""
-    text = _better(str(frames), before, frames.size)
-    return f"{text}; the frame was found from the file's anchors, so their standard deviations do not include its error"
+    """Return the error of poses in another frame."""
+    return _better(str(frames), before, frames.size)
 
 
 def _better(text: str, before: float, after: float) -> str:
@@ -169,14 +169,18 @@ def _better(text: str, before: float, after: float) -> str:
     return f"{text}: correcting this makes the differences between lengths and poses {times} times smaller"
 
 
-def _corrected(given: Measurements, placed: Placed, columns: np.ndarray, factors: np.ndarray | float) -> Measurements:
+def _corrected(
+    given: Measurements, placed: Placed, columns: np.ndarray, factors: np.ndarray | float, framed: tuple[str, ...] = ()
+) -> Measurements:
     position, rotation, carriers = placed
     poses = given.poses
     if poses is not None:
         poses = np.where(np.isfinite(poses), np.hstack([position, points.angles(rotation)]), np.nan)
     tensions = None if given.tensions is None else given.tensions[:, columns]
     lengths = given.lengths[:, columns] * factors
-    return changed(given, lengths=lengths, poses=poses, tensions=tensions, carrier_poses=carriers)
+    result = changed(given, lengths=lengths, poses=poses, tensions=tensions, carrier_poses=carriers)
+    result.framed = framed or given.framed
+    return result
 
 
 def _displaced(log: LogPart, given: Measurements, noise: float) -> Mistake | None:
@@ -198,7 +202,7 @@ def _displaced(log: LogPart, given: Measurements, noise: float) -> Mistake | Non
         if sizes[0] < VERY_CLEARLY * sizes[1]:
             return None  # displaced ends of cables are as plausible
     position, rotation, _ = measured_poses(robot, given)
-    corrected = _corrected(given, (*frames.of(position, rotation), None), np.arange(robot.m), 1.0)
+    corrected = _corrected(given, (*frames.of(position, rotation), None), np.arange(robot.m), 1.0, frames.found)
     shift, turn = frames.inner
     moved = np.linalg.norm(robot.attachments @ (turn - np.eye(3)).T + shift, axis=1).max()
     return Mistake(_in_frame(frames, before), corrected, severe=bool(moved > PLAUSIBLE * length_of(robot)))

@@ -48,7 +48,7 @@ class Part(NamedTuple):
         where, first = np.flatnonzero(parameters.varies), cable * OF_CABLE
         mine, rest = (where >= first) & (where < first + OF_CABLE), where >= parameters.clock
         own = self.derivatives.cables[cable][:, where[mine] - first]
-        rows = np.hstack([own, self.derivatives.others[cable][:, where[rest] - parameters.clock]])
+        rows = np.hstack([own, self.derivatives.others[cable]])
         rows, columns = rows / self.scale[where[mine | rest]], np.flatnonzero(mine | rest)
         if self.Y is None:
             return rows, columns

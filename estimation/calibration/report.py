@@ -10,6 +10,7 @@ from ...figures.drawing import Drawing
 from ...figures.report import Part, Report, Section, Table
 from ...models.parsing import to_yaml
 from ..logs.load_cells import slack
+from .file_errors import ENDS
 from .geometry import length_of
 from .result import CalibrationData, Parameter
 from .solving import is_still
@@ -109,6 +110,13 @@ def _of_noise(result: CalibrationData) -> list[str]:
         )
     if result.noise > LACKS * stated and "scales" not in result.free:
         lines.append("the model is incomplete: --free auto also tries scales, attachments and more")
+    for frame, end in ((one, ENDS[one]) for one in ENDS if one in result.free):
+        size = f"wrong by {_mm(result.prior[end])}" if end in result.prior else "exact"
+        what = "the frame of the poses" if frame == "frame" else "the measured body"
+        lines.append(
+            f"{what} was found from the file's {end}, which are taken to be {size}: the standard deviations below "
+            "include its error"
+        )
     kept = {"anchors", "offsets"} - set(result.free)
     if len(kept) == 1 and is_still(result.measurements):
         name = kept.pop()
@@ -151,7 +159,14 @@ def _of_parameters(result: CalibrationData) -> list[Part]:
 
 def _one(one: Parameter) -> tuple[str, str, str, str]:
     """Return name, value, standard deviation and change of a parameter."""
-    usual = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e6, "ppm"), "1/N": (1e6, "1/MN"), "1/m": (1e6, "ppm/m")}
+    usual = {
+        "m": (1e3, "mm"),
+        "s": (1e3, "ms"),
+        "1": (1e6, "ppm"),
+        "1/N": (1e6, "1/MN"),
+        "1/m": (1e6, "ppm/m"),
+        "rad": (180 / np.pi, "deg"),
+    }
     factor, unit = usual.get(one.unit, (1.0, one.unit))
     sigma = quantity(factor * one.sigma, unit, digits=2) if np.isfinite(one.sigma) else "not determined"
     change = quantity(0.0 if unit == "mm" and abs(one.correction) < SMALLEST else factor * one.correction, unit)

@@ -47,7 +47,7 @@ class CalibrationData(Displayed):
 
     Attributes:
         free: Groups of estimated parameters.
-        prior: Standard deviations about the file's values, if given.
+        prior: Standard deviations about the file's values, if given, or as large as errors of the file turn out to be.
         mistake: A probable input error of the log, such as cables in another order or degrees read as radians, or None.
     """
 

@@ -7,6 +7,8 @@ from ...models.files import AnyRobot, as_robot
 from ..logs.measurements import Measurements, check_measurements
 from .calibration import Calibration
 from .cross_validation import select
+from .file_errors import errors_of_file, loose
+from .geometry import length_of
 from .parameters import GROUPS, check_free, check_prior
 from .plausibility import mistake
 from .solving import check_enough, solve, usual
@@ -31,11 +33,12 @@ def calibrate(
         measurements: `Measurements` of the robot, or from `read_measurements`.
         free: Parameters to estimate, any of anchors, attachments, offsets (of the lengths), scales (of the lengths),
             radii (of the pulleys), build-up (of cable on the drums), clock (time by which the clock of the poses is
-            ahead of the clock of the lengths), com (CoM of the platform), and with tensions mass, stiffness, capstan
-            (friction as the logarithm of a ratio of tensions), friction (as a force), gains (newtons per unit of the
-            tensions, if these are motor currents) and zeros (of load cells; also estimated if the log shows some).
-            Default: anchors and offsets, and the clock if times and poses of a motion were measured. Or "auto": the
-            smallest set whose cross-validation error is close to the smallest one; this set may be empty.
+            ahead of the clock of the lengths), frame and body (errors of the frame that poses were measured in, and of
+            the platform frame in the measured body), com (CoM of the platform), and with tensions mass, stiffness,
+            capstan (friction as the logarithm of a ratio of tensions), friction (as a force), gains (newtons per unit
+            of the tensions, if these are motor currents) and zeros (of load cells; also estimated if the log shows
+            some). Default: anchors and offsets, and the clock if times and poses of a motion were measured. Or "auto":
+            the smallest set whose cross-validation error is close to the smallest one; this set may be empty.
         prior: Standard deviations of the file's values, in the units of the parameters, by the names of `free`, such as
             {"anchors": 0.02}. Default: no prior; unobservable directions change as little as possible.
         outliers: True to detect outliers, which are left out, and slipped winches, whose cable gets a new offset after
@@ -56,10 +59,15 @@ def calibrate(
         prior = None if prior is None else {name: value for name, value in prior.items() if name in groups}
     else:
         groups = usual(chosen, given) if free is None else check_free(chosen, free)
+        groups = tuple(name for name in GROUPS if name in (*groups, *given.framed))
     priors = check_prior(prior, groups)
     if groups:
         check_enough(chosen, given, groups, priors)
-    solved = solve(chosen, given, groups, priors, outliers)
+    first = loose(length_of(chosen), groups, priors)
+    solved = solve(chosen, given, groups, first, outliers)
+    if first != priors:
+        priors = errors_of_file(solved, priors)
+        solved = solve(chosen, given, groups, priors, outliers)
     if has_zeros(solved):
         groups, priors = with_zeros(given, groups, priors)
         solved = solve(chosen, given, groups, priors, outliers)

@@ -14,7 +14,7 @@ from ...models import points
 from ..logs.measurements import Measurements
 from .geometry import Runs, record_with
 from .motion import cross
-from .parameters import Parameters
+from .parameters import OF_ROBOT, Parameters
 
 SEEN = (*range(6), 8)  # parameters of a cable on which its direction depends
 STEEPEST = 1e-3  # horizontal part of a unit vector, of which an azimuth tells nothing
@@ -24,18 +24,18 @@ class Sighted(NamedTuple):
     """Residuals (m, N, 3) of directions and, if wanted, their derivatives, which are by each cable's own parameters.
 
     - `cables`: by anchor, attachment and radius of the pulley, the columns `SEEN`, (m, N, 3, 7).
-    - `clock`: by the clock offset, (m, N, 3).
+    - `robot`: by the parameters of the robot, (m, N, 3, 17).
     - `poses`: by shift and rotation of the sample, (m, N, 3, 6).
     """
 
     residuals: np.ndarray
     cables: np.ndarray | None = None
-    clock: np.ndarray | None = None
+    robot: np.ndarray | None = None
     poses: np.ndarray | None = None
 
     def leave_out(self, rows: np.ndarray) -> None:
         """Set residuals and derivatives of some samples, (N,) of bool, to zero in place."""
-        for one in (self.residuals, self.cables, self.clock, self.poses):
+        for one in (self.residuals, self.cables, self.robot, self.poses):
             if one is not None:
                 one[:, rows] = 0.0
 
@@ -78,11 +78,11 @@ def sightings(
     by_shift = by_geometry[..., 3:6] @ np.swapaxes(rotation, 1, 2)
     arms = np.einsum("nij,mj->mni", rotation, table[:, 3:6])
     by_turn = -by_shift @ cross(arms.reshape(-1, 3)).reshape(m, count, 3, 3)
-    by_clock = np.zeros((m, count, 3))
+    of_robot = np.zeros((m, count, 3, OF_ROBOT))
     if carried is not None:
         velocity, rate = carried
-        by_clock = (W @ np.cross(rate, u)[..., None] - by_shift @ velocity[..., None])[..., 0]
-    return Sighted(residuals, by_geometry, by_clock, np.concatenate([by_shift, by_turn], axis=3))
+        of_robot[..., 0] = (W @ np.cross(rate, u)[..., None] - by_shift @ velocity[..., None])[..., 0]
+    return Sighted(residuals, by_geometry, of_robot, np.concatenate([by_shift, by_turn], axis=3))
 
 
 def sighted(measurements: Measurements) -> np.ndarray:

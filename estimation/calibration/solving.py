@@ -10,7 +10,7 @@ from ...base.text import counted
 from ...models.robot import Robot
 from ..logs.cable_directions import placed
 from ..logs.load_cells import slack
-from ..logs.measurements import Measurements, measured_poses, tracked
+from ..logs.measurements import Measurements, measured, measured_poses, tracked
 from ..logs.pose_track import PoseTrack
 from .autocorrelation import information_of
 from .balance import Balance
@@ -266,6 +266,9 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
                 f"measurements.times must span more than {CLOCK_RANGE / 5:g} s to estimate a clock offset, got "
                 f"{measurements.times[-1] - measurements.times[0]:g} s"
             )
+    framed = [name for name in ("frame", "body") if name in groups]
+    if framed and not measured(measurements).any():
+        raise InputError(f"measurements.poses must be given to estimate {', '.join(framed)}, got none")
     of_forces = [name for name in groups if name in (*IN_BALANCE, "stiffness")]
     if measurements.tensions is None and of_forces not in ([], ["com"]):
         flies = any(carrier.actuators for carrier in robot.carriers)

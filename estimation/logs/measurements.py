@@ -75,6 +75,7 @@ class Measurements(Displayed):
         tensions, times, carrier_poses, directions: The given arrays, or None; directions have unit length, horizontal
             if azimuths were measured.
         sigma: `Sigma`: of lengths, positions, rotations, tensions, directions and clocks.
+        framed: Parameters that are always estimated because poses were corrected for them: "frame" and "body", or none.
 
     Raises:
         InputError: If an argument has a wrong shape or value; nan in lengths, tensions or times is refused.
@@ -104,6 +105,7 @@ class Measurements(Displayed):
         self.sigma = _sigma(sigma)
         self.carrier_poses = CHECKS["carrier_poses"](carrier_poses, shape)  # (N, c, 6)
         self.directions = CHECKS["directions"](directions, shape)  # (N, m, 3)
+        self.framed: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.lengths)
@@ -204,7 +206,9 @@ def changed(measurements: Measurements, **new: Any) -> Measurements:
     shape = measurements.lengths.shape
     if np.shape(new.get("lengths", measurements.lengths)) != shape:
         given: dict[str, Any] = {name: getattr(measurements, name) for name in ARRAYS}
-        return Measurements(**given | {"sigma": measurements.sigma._asdict(), **new})
+        other = Measurements(**given | {"sigma": measurements.sigma._asdict(), **new})
+        other.framed = measurements.framed
+        return other
     result = copy(measurements)  # which shares the arrays that stay: those of a long log are large
     for name, value in new.items():
         setattr(result, name, CHECKS[name](value, shape))
