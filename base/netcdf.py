@@ -9,10 +9,12 @@ import sys
 import threading
 import warnings
 from collections.abc import Collection, Mapping
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from typing_extensions import override
 
 from .declared import check_hdf5, check_heaps
 from .errors import InputError
@@ -21,6 +23,7 @@ from .reading import check_file
 from .writing import whole_file
 
 if TYPE_CHECKING:
+    import h5py
     import xarray as xr
 
 _alone = threading.Lock()
@@ -47,14 +50,11 @@ class Contents(NamedTuple):
     @classmethod
     def of(cls, dataset: xr.Dataset) -> Contents:
         """Return the contents of a dataset."""
-
-        def plain(variables: Mapping[Any, xr.DataArray]) -> dict[str, Variable]:
-            return {
-                str(name): Variable(tuple(map(str, variable.dims)), variable.values, variable.attrs)
-                for name, variable in variables.items()
-            }
-
-        return cls(plain(dataset.data_vars), plain(dataset.coords), dataset.attrs)
+        plain = (
+            {str(name): Variable(tuple(map(str, one.dims)), one.values, one.attrs) for name, one in part.items()}
+            for part in (dataset.data_vars, dataset.coords)
+        )
+        return cls(*plain, dataset.attrs)
 
     def get(self, name: str) -> Variable | None:
         """Return a variable or coordinate, or None if there is none of that name."""
@@ -79,7 +79,7 @@ def save_netcdf(contents: Contents, path: Path, compressed: Collection[str] = ()
     # In memory first: HDF5 brings the process down, file left behind, where a disk is full.
     content = io.BytesIO()
     everything = {**contents.coordinates, **contents.variables}
-    with h5netcdf.File(content, "w") as file:
+    with _file()(content, "w", track_order=True) as opened, h5netcdf.File(opened, "w") as file:
         file.dimensions = {
             name: size
             for variable in everything.values()
@@ -114,7 +114,7 @@ def load_netcdf(path: Path, refusal: str) -> xr.Dataset:
 
     Raises `InputError` if it cannot or must not be read: `refusal`, and the reason in brackets.
     """
-    import h5py
+    import h5netcdf
     import xarray as xr
 
     with _alone:  # the hook and the warnings are those of the whole process
@@ -123,13 +123,14 @@ def load_netcdf(path: Path, refusal: str) -> xr.Dataset:
         try:
             try:
                 size = check_file(path, "a NetCDF file", LARGEST)
-                with h5py.File(path) as file, open(path, "rb") as stream:
+                with _file()(path) as file, open(path, "rb") as stream:
                     with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as content:
                         check_heaps(content)
                     check_hdf5(file, size)
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore")  # of what is unusual in a file; whoever uses it checks what matters
-                    return xr.load_dataset(path, engine="h5netcdf")
+                    with warnings.catch_warnings():
+                        warnings.simplefilter("ignore")  # of what is unusual; whoever uses it checks what matters
+                        opened = h5netcdf.File(file, "r", decode_vlen_strings=True)
+                        return xr.load_dataset(xr.backends.H5NetCDFStore(opened))
             except Exception as error:  # it may fail at any place of three libraries
                 # HDF5 has its own message of several lines, where others have a few words.
                 reason = printable((str(getattr(error, "strerror", None) or error) or "empty").splitlines()[0])
@@ -138,6 +139,27 @@ def load_netcdf(path: Path, refusal: str) -> xr.Dataset:
         finally:
             sys.unraisablehook = hook
     raise InputError(f"{refusal} ({reason})")
+
+
+@cache
+def _file() -> type[h5py.File]:
+    """Return the class of files that look up each name once: h5netcdf does so for each property of a variable."""
+    import h5py
+
+    class File(h5py.File):
+        @override
+        def __getitem__(self, name: Any) -> Any:
+            if not isinstance(name, str):  # a reference
+                return super().__getitem__(name)
+            kept = self.__dict__.setdefault("_kept", {"/": self})
+            return kept[name] if name in kept else kept.setdefault(name, super().__getitem__(name))
+
+        @override
+        def __delitem__(self, name: str) -> None:
+            self.__dict__["_kept"] = {"/": self}
+            super().__delitem__(name)
+
+    return File
 
 
 def check_units(name: str, attributes: Mapping[Any, Any]) -> None:
