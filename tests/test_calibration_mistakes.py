@@ -242,6 +242,16 @@ def test_frames_of_four_cables_that_sway(world, body, order, tmp_path):
     assert np.abs(found.corrected.poses[:, :3] - place[body > 0 : len(times) - (not body)]).max() < 0.08
 
 
+@pytest.mark.parametrize(("turn", "where"), [([0, 0.2, 0], [0.05, 0, 0.1]), ([1, 2, -0.5], [3, 1, 0.2])])
+def test_frames_of_planar_robots_bring_poses_into_their_plane(turn, where):
+    robot, poses, y = a_log("planar-4", count=120)
+    assert mistake(robot, Measurements(y, poses)) is None
+    found = mistake(robot, Measurements(y, seen(poses, (where, Rotation.from_rotvec(turn)))))
+    assert "measured in a frame" in found.text
+    assert np.abs(found.corrected.poses - poses)[:, [1, 3, 5]].max() < 1e-3
+    assert np.abs(found.corrected.poses - poses)[:, :3].max() < 0.06
+
+
 def test_the_command_mends(tmp_path):
     robot, poses, y = a_log("cogiro", 2)
     for what, text in (

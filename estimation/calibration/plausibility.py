@@ -189,7 +189,7 @@ def _displaced(log: LogPart, given: Measurements, noise: float) -> Mistake | Non
     It is an input error if, of another body, it would move the ends of cables farther than a file may be wrong.
     """
     robot = log.robot
-    if len(log.y) < FEWEST[1] or robot.dof_mask.sum() < 6:
+    if len(log.y) < FEWEST[1]:
         return None
     found = displaced_frames(log, DISPLACED, noise)
     if found is None:
