@@ -12,10 +12,11 @@ the plan need in addition to c: r = 1 and u = 0 are the plan itself. Each facet 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from itertools import groupby
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -40,18 +41,19 @@ if TYPE_CHECKING:
     import xarray as xr
 
 STEP = 0.008  # [s] between two instants of a stop, in which u is linear
-PARTS = 8  # of a step, between which a stop is audited and given
 FASTEST = 0.5 / STEP  # [1/s], of u
 WINDOW, INSTANTS = 0.8, 80  # [s] of the plan that limits are computed for at once, and at how many instants
 LEVELS = np.linspace(0.0, 1.0, 65)  # of r^2, at which is asked how slow a stop may become
+ROOM = 1.0  # [1/s], between the least and the largest u
+STILL = 1e-9  # of the rate
+FLAT = 1e-12  # of the robot's forces: a facet along which u changes less does not bound it
+PARTS = 8  # of a step, between which a stop is audited and given
 # One after the other: the reserve, a share of what the cables can give along each normal, and whether a robot goes on
 # through places in which it cannot rest.
 ATTEMPTS = (0.002, True), (0.02, True), (0.1, True), (0.002, False)
 LITTLE = 1e-3  # of the robot's forces: a wrench that is missed by less matters less than the time to stop
-ROOM = 1.0  # [1/s], between the least and the largest u
 LONGEST = 60.0  # [s]
-STILL = 1e-9  # of the rate
-FLAT = 1e-12  # of the robot's forces: a facet along which u changes less does not bound it
+AT_ONCE = 16  # stops that are audited
 MISSING = 1e-7  # of the robot's forces: a wrench that is missed by less is given
 
 
@@ -134,34 +136,41 @@ def stop_along(robot: Robot, trajectory: Trajectory, time: float) -> Stop:
 
     Raises `InputError` if the robot has flying carriers with other cables than `control.stop` describes.
     """
-    begins = min(time, trajectory.duration or 0.0)
-    load = trajectory.load_at(begins)
-    found = _stop_along(robot if load is None else load.on(robot), trajectory, begins)
-    return replace(found, robot=robot, load=load)
+    return next(_stops_along(robot, trajectory, np.array([min(time, trajectory.duration or 0.0)])))
 
 
-def _stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Stop:
-    """Stop a robot that carries nothing else."""
+def _stops_along(robot: Robot, trajectory: Trajectory, times: np.ndarray) -> Iterator[Stop]:
+    """Yield the stops that begin at some times."""
+    for load, begin in groupby(times.tolist(), trajectory.load_at):
+        for found in _unloaded(robot if load is None else load.on(robot), trajectory, list(begin)):
+            yield replace(found, robot=robot, load=load)
+
+
+def _unloaded(robot: Robot, trajectory: Trajectory, times: list[float]) -> Iterator[Stop]:
+    """Yield the stops of a robot that carries nothing else."""
     end = trajectory.duration or 0.0
     if any(carrier.efforts for carrier in robot.carriers):
-        times, tau, platform, carriers, tensions, _, limit = team_stop_along(robot, trajectory, begins)
-        return Stop(robot, float(tau[0]), float(tau[-1]), times, platform, carriers, tensions, None, limit)
+        for begins in times:
+            time, tau, platform, carriers, tensions, _, limit = team_stop_along(robot, trajectory, begins)
+            yield Stop(robot, float(tau[0]), float(tau[-1]), time, platform, carriers, tensions, None, limit)
+        return
     trajectory = continued(trajectory, together=False)
-    best: tuple[tuple[int, bool, float], Stop, TensionProblem | None] | None = None
-    instants = cache(lambda first: _instants(robot, trajectory, first))  # which all attempts have in common
-    for attempt in (*ATTEMPTS, None):
-        law = _braking(_Limits(instants, begins, end, *attempt)) if attempt else _planned(trajectory, begins, end)
-        if law is None:
-            break
-        found, missing, worst = _audited(robot, trajectory, _refined(law))
-        if missing <= MISSING * robot.force_scale and not found.limit:
-            return found
-        # Of two that miss little, or nearly the same, the shorter one.
-        rank = (round(missing / (LITTLE * robot.force_scale)), bool(found.limit), found.duration)
-        if best is None or rank < best[0]:
-            best = rank, found, worst if missing > MISSING * robot.force_scale else None
-    assert best is not None
-    return best[1] if best[2] is None else replace(best[1], certificate=certify(best[2]))
+    # What all stops and attempts have in common.
+    instants = cache(lambda window: _instants(robot, trajectory, WINDOW * window))
+    bounds = cache(lambda window, reserve: instants(window).bounds(reserve))
+    for first in range(0, len(times), AT_ONCE):
+        best = dict[float, _Tried]()
+        for attempt in (*ATTEMPTS, None):
+            laws = {
+                each: _braking(_Limits(bounds, each, end, *attempt)) if attempt else _planned(trajectory, each, end)
+                for each in times[first : first + AT_ONCE]
+                if each not in best or best[each].rank[0]
+            }
+            laws = {each: _refined(law) for each, law in laws.items() if law is not None}
+            for each, audited in zip(laws, _audited(robot, trajectory, [*laws.values()]) if laws else (), strict=True):
+                best[each] = min([*([best[each]] if each in best else []), audited], key=lambda its: its.rank)
+        for _, found, worst in best.values():
+            yield found if worst is None else replace(found, certificate=certify(worst))
 
 
 def beginnings(trajectory: Trajectory, period: float) -> np.ndarray:
@@ -172,8 +181,16 @@ def beginnings(trajectory: Trajectory, period: float) -> np.ndarray:
 
 def longest_stop_along(robot: Robot, trajectory: Trajectory, times: np.ndarray) -> Stop:
     """Return the longest of the stops that begin at some times, or the first infeasible one."""
-    stops = (stop_along(robot, trajectory, time) for time in times.tolist())
-    return max(stops, key=lambda its: (not its.feasible, its.duration))
+    return max(_stops_along(robot, trajectory, times), key=lambda its: (not its.feasible, its.duration))
+
+
+_BoundsAt: TypeAlias = Callable[[int, float], "_Bounds"]  # of the instants of a window, from its number and the reserve
+
+
+class _Tried(NamedTuple):
+    rank: tuple[bool, int, bool, float]  # of two that miss little, or nearly the same, the shorter one is better
+    stop: Stop
+    worst: TensionProblem | None  # of the instant whose wrench is missed most; None if none is
 
 
 class _Law(NamedTuple):
@@ -188,29 +205,19 @@ class _Law(NamedTuple):
 class _Limits:
     """The range of u at times of a plan, from the limits of tensions and of the accelerations of carriers."""
 
-    def __init__(
-        self, instants: Callable[[float], _Instants], begins: float, end: float, reserve: float, goes_on: bool
-    ):
+    def __init__(self, bounds: _BoundsAt, begins: float, end: float, reserve: float, goes_on: bool):
         self.begins, self._apart, self._goes_on, self._end = begins, WINDOW / INSTANTS, goes_on, end
-        self._bounds = lambda first: instants(first).bounds(reserve)
-        self._rows = self._bounds(begins)
+        self._bounds, self._reserve, self._first = bounds, reserve, int(begins / WINDOW)
+        self._next, self._rows = self._first + 1, bounds(self._first, reserve)
         self._extend(0)
 
     def _extend(self, windows: int) -> None:
         """Compute the limits of more windows, up to an instant at which the robot can rest, or the end of the plan."""
-        for _ in range(windows):
-            self._add()
-        while self._goes_on and not self._rows.can_rest[-1] and self._until < self._end:
-            self._add()
+        while windows > 0 or (self._goes_on and not self._rows.can_rest[-1] and WINDOW * self._next < self._end):
+            more = self._bounds(self._next, self._reserve)
+            self._rows = _Bounds(*(np.concatenate(parts) for parts in zip(self._rows, more, strict=True)))
+            self._next, windows = self._next + 1, windows - 1
         self._lowest = self._floor()
-
-    def _add(self) -> None:
-        more = self._bounds(self._until)
-        self._rows = _Bounds(*(np.concatenate(parts) for parts in zip(self._rows, more, strict=True)))
-
-    @property
-    def _until(self) -> float:
-        return self.begins + self._apart * len(self._rows.falls)
 
     def _floor(self) -> np.ndarray:
         """Return the least x = r^2 from which the motion can go on inside the limits, at each instant, (n,)."""
@@ -228,7 +235,7 @@ class _Limits:
 
     def at(self, tau: float, rate: float) -> tuple[float, float]:
         """Return the least and the largest u at a time of the plan and a rate."""
-        place = (tau - self.begins) / self._apart
+        place = (tau - WINDOW * self._first) / self._apart
         while place > len(self._lowest) - 3:
             self._extend(1)
         k = int(place)
@@ -281,7 +288,7 @@ class _Instants(NamedTuple):
     c: np.ndarray
     low: np.ndarray  # of what the cables can give
     high: np.ndarray
-    carriers: tuple[np.ndarray, np.ndarray, np.ndarray]  # vv, vg and gg of `_Bounds`
+    carriers: tuple[np.ndarray, np.ndarray, np.ndarray]  # vv, vg and gg of `Bounds`
 
     def bounds(self, reserve: float) -> _Bounds:
         """Return the bounds of u; tensions keep the share `reserve` of their range."""
@@ -372,17 +379,23 @@ def _slowed(motion: Motion, law: _Law) -> Motion:
     return pose, rate * velocity, rate**2 * acceleration + slope * velocity
 
 
-def _audited(robot: Robot, trajectory: Trajectory, law: _Law) -> tuple[Stop, float, TensionProblem]:
-    """Return a stop, how much of the wrench its tensions miss most [N], and the problem of that instant."""
+def _audited(robot: Robot, trajectory: Trajectory, laws: list[_Law]) -> Iterator[_Tried]:
+    """Yield the stops of some laws, of which there is one at least."""
+    law, dynamics = _Law(*(np.concatenate(parts) for parts in zip(*laws, strict=True))), dynamics_of(robot)
     platform, carriers = trajectory.at(law.tau)
-    slowed, dynamics, mask = _slowed(platform, law), dynamics_of(robot), robot.dof_mask
-    A = dynamics.wrench_matrix(platform[0], carriers[0]) * mask[:, None]
-    w = dynamics.required_wrench(*slowed, wind=trajectory.wind) * mask
+    slowed, moved = _slowed(platform, law), _slowed(carriers, law)
+    A = dynamics.wrench_matrix(platform[0], carriers[0]) * robot.dof_mask[:, None]
+    w = dynamics.required_wrench(*slowed, wind=trajectory.wind) * robot.dof_mask
     near = None if trajectory.tensions is None else np.nan_to_num(trajectory.tensions(law.tau))
     tensions = solve_batch(A, w, robot.t_min, robot.t_max, t_ref=near, length=robot.length, rho=RHO).tensions
-    missing = np.linalg.norm((w - (A @ tensions[:, :, None])[..., 0]) * robot.wrench_scale, axis=1)
-    worst = int(np.argmax(missing))
-    limit = overloaded_winch(robot, law.times, dynamics.cable_lengths(platform[0], carriers[0]), tensions)
-    ends = float(law.tau[0]), float(law.tau[-1])
-    found = Stop(robot, *ends, law.times, slowed, _slowed(carriers, law), tensions, None, limit)
-    return found, float(missing[worst]), wrench_problem(robot, A[worst], w[worst])
+    missing = np.linalg.norm((w - (A @ tensions[:, :, None])[..., 0]) * robot.wrench_scale, axis=1) / robot.force_scale
+    lengths, last = dynamics.cable_lengths(platform[0], carriers[0]), 0
+    for own in laws:
+        some = slice(last, last := last + len(own.times))
+        at = some.start + int(np.argmax(missing[some]))
+        worst = wrench_problem(robot, A[at], w[at]) if missing[at] > MISSING else None
+        limit = overloaded_winch(robot, own.times, lengths[some], tensions[some])
+        motions = (tuple(part[some] for part in motion) for motion in (slowed, moved))
+        found = Stop(robot, *own.tau[[0, -1]].tolist(), own.times, *motions, tensions[some], None, limit)
+        rank = (worst is not None or bool(limit), round(missing[at] / LITTLE), bool(limit), found.duration)
+        yield _Tried(rank, found, worst)

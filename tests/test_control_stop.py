@@ -119,7 +119,7 @@ def test_a_duration_with_a_stop_that_takes_too_long_is_known_from_some_of_its_st
     whole = found.duration / stops_within.LEAST_PERIOD  # stops of one duration
     few = [count for count in counts if count < 0.5 * whole]  # all that a duration that is too short takes
     assert sum(few) < 0.25 * whole * len(few)
-    assert len(few) > 2 * (len(counts) - len(few))
+    assert len(counts) - len(few) <= 2  # durations that suffice
     assert longest_stop(found, 0.013).duration <= 0.25 + 0.008  # also from instants that planning has not looked at
 
 

@@ -20,7 +20,7 @@ from .checks import START_TENSIONS, excesses
 from .clearances import came_too_near
 from .drift import Drift, drift
 from .excess import TENSIONS, Excess
-from .instants import instants
+from .instants import instants, limited
 from .peaks import with_peaks
 from .tensions import INDEPENDENT, scaled, tolerance_of
 
@@ -42,11 +42,16 @@ class Audit(Displayed):
     tracking_error: np.ndarray  # distance from the path at each time, (n,) [m]
     excess: list[Excess] = field(default_factory=list)  # other hard limits that are exceeded (`limits`, ends, ...)
     soft_excess: list[Excess] = field(default_factory=list)  # soft limits that are exceeded
-    limited: list[np.ndarray] = field(default_factory=list)  # what each limit bounds, (n, k) in its unit
     # The one with the largest shortfall, with its time, and its wind if the task has a box of winds; None if all exist.
     certificate: Certificate | None = None
     supports: np.ndarray | None = None  # forces of the ground, (n, s) [N], zero while it hangs; None without ground
+    limiting: Callable[[], list[np.ndarray]] = field(default=list, repr=False, compare=False)  # computes `limited`
     drifting: Callable[[], Drift] | None = field(default=None, repr=False, compare=False)  # computes `drift`
+
+    @cached_property
+    def limited(self) -> list[np.ndarray]:
+        """Return what each limit bounds, (n, k) in its unit; nan where a limit is not in force."""
+        return self.limiting()
 
     @cached_property
     def drift(self) -> Drift | None:
@@ -120,7 +125,7 @@ def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False
         tracking_error=np.linalg.norm(regular.off_path[:, :3], axis=1),
         excess=[excess for excess in exceeded if excess.limit not in soft],
         soft_excess=[excess for excess in exceeded if excess.limit in soft],
-        limited=regular.values,
+        limiting=partial(limited, scenario, times, motion, carriers, regular.values),
         certificate=seen.certificate,
         drifting=partial(drift, scenario, times, motion, carriers, tensions) if followed else None,
     )

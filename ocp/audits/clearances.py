@@ -15,7 +15,8 @@ import numpy as np
 from ...models.batch import in_blocks
 from ...models.points import placed
 from ..limits.distance import Distance
-from ..limits.limits import Motion, Separating, motions
+from ..limits.limits import Separating, motions
+from ..tasks.paths import Motion
 from .curvature import is_jump, leaves
 from .excess import Excess
 from .instants import Instants
@@ -23,6 +24,7 @@ from .instants import Instants
 UNDECIDED = 0.05  # of a limit's tolerance: less than that beside it is not looked for
 DEEPEST = 0.99  # of the largest excess is found
 MOST_HALVES = 50
+PARTS = 4  # of the time between two instants at which a distance is known, where it may be too small in between
 
 _Least: TypeAlias = tuple[float, int, float]
 """Time, index and value of a distance."""
@@ -31,10 +33,10 @@ _Least: TypeAlias = tuple[float, int, float]
 def came_too_near(audited: Instants) -> list[Excess]:
     """Return the limits of distances that are not kept, at the instants of the audit or between them."""
     exceeded = dict[tuple[str, str, float], Excess]()
-    pairs = zip(audited.scenario.limits, audited.values, strict=True)
-    chosen = [(limit, values) for limit, values in pairs if isinstance(limit, Distance)]
+    chosen = [limit for limit in audited.scenario.limits if isinstance(limit, Distance)]
     moved = _moved(audited) if chosen else np.zeros(0)
-    for limit, values in chosen:
+    for limit in chosen:
+        values = _values(audited, limit, limit.per_metre * moved)
         holds = audited.scenario.in_force(limit, audited.times)
         slack = np.where(np.isnan(values), -np.inf, values - limit.low + limit.tolerance)
         slack[~holds] = np.inf
@@ -50,8 +52,48 @@ def came_too_near(audited: Instants) -> list[Excess]:
             facts = (time, value, limit.low, limit.unit, "at least")
             pair = limit.name, limit.about(which), limit.low
             if pair not in exceeded or value < exceeded[pair].value:  # a body and a region may have two limits
-                exceeded[pair] = Excess(limit.name, limit.about(which), *facts)
+                between = _between_nodes(audited, limit, time, which)
+                exceeded[pair] = Excess(limit.name, limit.about(which), *facts, between=between)
     return list(exceeded.values())
+
+
+def _values(audited: Instants, limit: Distance, changes: np.ndarray) -> np.ndarray:
+    """Return the distances of a limit at all instants, (n, k) [m].
+
+    They change by at most `changes` (n - 1,) from one to the next. Where this shows that they are larger than the limit
+    at all times between some instants, those in between are what they are at least.
+    """
+    scenario, n = audited.scenario, len(audited.times)
+    if not np.isfinite(changes).all():
+        return scenario.limits.distances(limit, audited.motion, audited.carriers)
+    way, enough = np.insert(np.cumsum(changes), 0, 0.0), limit.low + changes.max(initial=0.0)
+    values, known, more = np.empty((n, len(limit.labels))), np.zeros(n, bool), np.r_[0 : n - 1 : PARTS**3, n - 1]
+    while more.size:
+        platform, carriers = (Motion(*(part[more] for part in its)) for its in (audited.motion, audited.carriers))
+        values[more], known[more] = scenario.limits.distances(limit, platform, carriers), True
+        at = np.flatnonzero(known)
+        first, last = at[:-1], at[1:]
+        least = (values[first] + values[last] - (way[last] - way[first])[:, None]) / 2
+        undecided = (last - first > 1) & ~(least.min(axis=1) >= enough)
+        inner = np.linspace(first[undecided], last[undecided], PARTS + 1).astype(int)
+        more = np.setdiff1d(inner, at)
+    return np.where(known[:, None], values, np.vstack([np.repeat(least, last - first, axis=0), values[-1:]]))
+
+
+def _between_nodes(audited: Instants, limit: Distance, time: float, which: int) -> float | None:
+    """Return the distance of a pair at a time between two nodes, from the planes between its bodies at these [m].
+
+    However thin one is, so much more distance at the nodes keeps it out of the other; if the planes show that it is on
+    the other side of it at the second node, none does.
+    """
+    if audited.deviation is None:
+        return None
+    nodes, separating = audited.deviation.nodes, audited.scenario.limits.separating(limit)
+    after = int(np.clip(np.searchsorted(nodes, time), 1, len(nodes) - 1))
+    both = np.full(2, which)
+    at_nodes, there = (_at(audited, separating, at, both) for at in (nodes[after - 1 : after + 1], np.full(2, time)))
+    passes = at_nodes.normal[0] @ at_nodes.normal[1] < 0
+    return limit.low if passes else float(_from_plane(separating, at_nodes, there).max())
 
 
 def _moved(audited: Instants) -> np.ndarray:

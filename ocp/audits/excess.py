@@ -26,6 +26,9 @@ class Excess(Displayed):
     unit: str  # unit of value and bound
     accepted: Literal["at most", "at least", "exactly"] = "at most"  # side of the bound on which the value must be
     why: str = ""  # explanation; may be empty
+    # The value with which the program would keep the limit, if that is another: that of a distance has no least, but a
+    # thin region is nowhere deep. It is the bound where a tighter one at the nodes would not help.
+    between: float | None = None
 
     @classmethod
     def of(cls, limit: Limit, which: int, time: float, value: float, why: str = "") -> Self:
@@ -66,7 +69,8 @@ class Excess(Displayed):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the fields for JSON, with the sentence as "text"; numbers that do not exist are None."""
-        return asdict(self) | {"value": self.value if np.isfinite(self.value) else None, "text": str(self)}
+        facts = asdict(self) | {"value": self.value if np.isfinite(self.value) else None, "text": str(self)}
+        return {name: fact for name, fact in facts.items() if name != "between"}
 
 
 def _named(body: str) -> str:

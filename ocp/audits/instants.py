@@ -11,6 +11,7 @@ from ...base.display import Displayed
 from ...base.errors import InputError
 from ...solvers import Certificate
 from ..limits import Rate
+from ..limits.distance import Distance
 from ..tasks.deviation import Deviation
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
@@ -46,7 +47,7 @@ class Instants(Displayed):
     other_tensions: np.ndarray  # their tensions, (n, k, m) [N]
     violation: np.ndarray  # distance of the required wrench from the available ones, (n,) [N]
     supports: np.ndarray  # forces of the ground, (n, s) [N]; s = 0 for a task without ground
-    values: list[np.ndarray]  # what each limit bounds, (n, k) each
+    values: list[np.ndarray]  # what each limit bounds, (n, k) each; of distances (n, 0)
     certificate: Certificate | None  # that with the largest shortfall, with its time
     beyond: tuple[float, float]  # beyond the limits within the range of few cables [N], and when [s]
 
@@ -85,12 +86,12 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
     off_path = scenario.off_path(times, motion, carriers)
     cases = [(scaled(scenario, its), tensions) for its, tensions in ((w, result.tensions), *result.others)]
     other_w, other_tensions = (np.stack(each, axis=1)[:, 1:] for each in zip(*cases, strict=True))
-    limited = scenario.limits.along(motion, carriers, result.tensions, off_path)
+    bounded = scenario.limits.along(motion, carriers, result.tensions, off_path, distances=False)
     if not scenario.phases.rest:
-        chosen = within_motors(scenario, times, scaled(scenario, A), cases[0], limited)
+        chosen = within_motors(scenario, times, scaled(scenario, A), cases[0], bounded)
         if chosen is not result.tensions:
             result = result._replace(tensions=chosen)
-            limited = scenario.limits.along(motion, carriers, chosen, off_path)
+            bounded = scenario.limits.along(motion, carriers, chosen, off_path, distances=False)
     return Instants(
         scenario=scenario,
         deviation=deviation,
@@ -111,11 +112,23 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
         supports=result.supports,
         values=[
             np.where(scenario.in_force(limit, times)[:, None], limit.over(times, its), np.nan)
-            for limit, its in zip(scenario.limits, limited, strict=True)
+            for limit, its in zip(scenario.limits, bounded, strict=True)
         ],
         certificate=certificate,
         beyond=(result.beyond, float(times[result.row or 0])),
     )
+
+
+def limited(
+    scenario: Scenario, times: np.ndarray, motion: Motion, carriers: Motion, values: list[np.ndarray]
+) -> list[np.ndarray]:
+    """Return the values of `Instants` with those of distances."""
+    return [
+        np.where(scenario.in_force(limit, times)[:, None], scenario.limits.distances(limit, motion, carriers), np.nan)
+        if isinstance(limit, Distance)
+        else its
+        for limit, its in zip(scenario.limits, values, strict=True)
+    ]
 
 
 def joined(some: Instants, others: Instants) -> Instants:

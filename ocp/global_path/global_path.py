@@ -44,6 +44,7 @@ AGAIN = 1.0  # of what the first path took: what is spent on a shorter one, past
 PEAK_SPEED, PEAK_ACCELERATION = 2.2, 7.6  # of the law from rest to rest over a unit of length in a unit of time
 ON_THE_WAY, IN_PLACE = 3_000, 2_000  # configurations for one formation's way, and for its change at an end
 SHORTCUTS = 150
+SHORT = 1.02  # times the straight way: a path that is as short is not made shorter
 ROUNDS = 2  # of cutting corners
 CUT = 0.25  # of the two sides of a corner
 YAW = 5
@@ -118,7 +119,8 @@ def find_global_path(
         rng = np.random.default_rng(0)
         clear = ClearSpace(space, rest, min(part * space.size, MOST_RESERVE), budget, deadline)
         found = _connected(clear, rng)
-        if found is not None and not space.shaped:
+        straight = float(np.linalg.norm((space.ends[1] - space.ends[0]) * space.scale))
+        if found is not None and not space.shaped and found.length > SHORT * straight:
             clear.most = clear.evaluated + min(AGAIN * clear.evaluated, budget)
             shorter = _connected(clear, rng, found.length)
             if shorter is not None and shorter.length < found.length:
@@ -186,6 +188,8 @@ def shortened(path: np.ndarray, clear: ClearSpace, rng: Generator) -> np.ndarray
         if len(path) < 3 or not clear.in_time:
             break
         at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0) * scale, axis=1))])
+        if at[-1] <= SHORT * np.linalg.norm((path[-1] - path[0]) * scale):
+            break
         ends = np.sort(rng.uniform(0.0, at[-1], 2))
         group = groups[rng.integers(len(groups))]
         i, j = np.searchsorted(at, ends, side="right")

@@ -160,9 +160,14 @@ class Limits(Displayed):
         return self._separating[limit]
 
     def along(
-        self, platform: Motion, carriers: Motion, tensions: np.ndarray | None = None, off_path: np.ndarray | None = None
+        self,
+        platform: Motion,
+        carriers: Motion,
+        tensions: np.ndarray | None = None,
+        off_path: np.ndarray | None = None,
+        distances: bool = True,
     ) -> list[np.ndarray]:
-        """Return the values of each limit along a motion in {G}, (n, k).
+        """Return the values of each limit along a motion in {G}, (n, k); without `distances` none of these, (n, 0).
 
         - `platform`, `carriers`: pose, velocity and acceleration, (n, 6) each and (n, c, 6) each.
         - `tensions`: (n, m) [N]; where they are nan, so are the values that depend on them. Default: zeros.
@@ -174,14 +179,36 @@ class Limits(Displayed):
         arguments = motions(platform, carriers)
         arguments.append(np.zeros((n, self.robot.m)) if tensions is None else tensions)
         arguments.append(np.zeros((n, 6)) if off_path is None else off_path)
-        (values,) = in_blocks(self._of_block, arguments)
-        return [values[:, place] for place in self.places]
+        (values,) = in_blocks(self._of_block if distances else self._without_distances, arguments)
+        counts = [its.numel() if distances or not isinstance(limit, Distance) else 0 for limit, its in self._each]
+        return np.split(values, np.cumsum(counts)[:-1], axis=1)
+
+    def distances(self, limit: Distance, platform: Motion, carriers: Motion) -> np.ndarray:
+        """Return the distances of one limit along a motion in {G}, (n, k) [m]."""
+        if limit not in self._of_distance:
+            values = [self._values[self.all.index(limit)]]
+            self._of_distance[limit] = of_motions("distances", self._bodies, [], values).map(BLOCK)
+        return in_blocks(self._of_distance[limit], motions(platform, carriers))[0]
+
+    @cached_property
+    def _of_distance(self) -> dict[Limit, ca.Function]:
+        return {}
 
     def at_rest(self, platform: np.ndarray, carriers: np.ndarray) -> list[np.ndarray]:
         """Return the values of each limit at poses of platform (n, 6) and carriers (n, c, 6) at rest, (n, k)."""
         moving, bases = ((pose, np.zeros_like(pose), np.zeros_like(pose)) for pose in (platform, carriers))
         return self.along(moving, bases)
 
+    @property
+    def _each(self) -> Iterator[tuple[Limit, ca.SX]]:
+        return zip(self, self._values, strict=True)
+
     @cached_property
     def _of_block(self) -> ca.Function:
         return self.function.map(BLOCK)
+
+    @cached_property
+    def _without_distances(self) -> ca.Function:
+        others = [self._state.tensions, self._state.off_path]
+        values = [its for limit, its in self._each if not isinstance(limit, Distance)]
+        return of_motions("limits", self._bodies, others, [ca.vertcat(*values)]).map(BLOCK)

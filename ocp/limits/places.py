@@ -17,7 +17,6 @@ from .distance import Distance, Pair
 from .state import State
 
 ON_BODY = 1e-6  # [m], above the surface of a body: what is less outside counts as a part of it
-CORNER = 0.25  # of the thickness of a place: a motion that is deeper in it between nodes does not cut a corner
 
 
 class Outside(Distance):
@@ -42,11 +41,6 @@ class Outside(Distance):
     @override
     def title(self) -> str:
         return f"{self.name}, {self.called}"
-
-    @override
-    def share_beyond(self, value: float) -> float:
-        beyond = super().share_beyond(value)
-        return beyond if beyond < CORNER * self.thickness else 0.0  # more distance keeps nothing from passing through
 
     def _points(self, state: State, points: ca.SX) -> ca.SX:
         """Return points (3, k) of {G} in the frame of the region."""

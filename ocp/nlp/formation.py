@@ -15,6 +15,8 @@ from itertools import product
 import numpy as np
 
 from ...base.display import Displayed
+from ...models.points import placed
+from ..limits.distance import Distance
 from ..tasks.ends import carrier_ends, platform_ends
 from ..tasks.paths import Motion
 from ..tasks.scenario import POSITION, Scenario
@@ -146,21 +148,40 @@ def _placed(scenario: Scenario, references: _References, shape: np.ndarray) -> t
     return platform, carriers
 
 
-def _beyond(scenario: Scenario, platform: np.ndarray, carriers: np.ndarray) -> np.ndarray:
-    """Return the sum of the violations of the task's distances by platform (n, 6) and carriers (n, c, 6), (n,) [m]."""
-    beyond = np.zeros(len(platform))
-    for limit, values in zip(scenario.limits, scenario.limits.at_rest(platform, carriers), strict=True):
-        if limit.name in DISTANCES:
-            both = (limit.low + CLEARANCE - values, values - limit.high + CLEARANCE)
-            beyond += sum(np.maximum(side, 0.0).sum(axis=1) for side in both)
+def _beyond(scenario: Scenario, platform: np.ndarray, carriers: np.ndarray, tries: int = 1) -> np.ndarray:
+    """Return the sum of the violations of the task's distances by platform (n, 6) and carriers (n, c, 6), (n,) [m].
+
+    So many `tries` in turn are near each other: from the distances of one those of most others are known to suffice.
+    """
+    beyond, limits, rests = np.zeros(len(platform)), scenario.limits, [_at_rest(pose) for pose in (platform, carriers)]
+    corners, (ends, anchors) = placed(platform, scenario.body_corners), scenario.dynamics.points(platform, carriers)
+    points = np.concatenate([ends, anchors, corners, carriers[..., :3]], axis=1)
+    points = points.reshape(-1, tries, *points.shape[1:])
+    moved = np.linalg.norm(points - points[:, tries // 2, None], axis=3).max(axis=2)
+    for limit, values in zip(limits, limits.along(*rests, distances=False), strict=True):
+        if limit.name not in DISTANCES:
+            continue
+        rows = np.arange(len(platform))
+        if isinstance(limit, Distance):
+            if np.isfinite(limit.per_metre):
+                middle = (_at_rest(pose[tries // 2 :: tries]) for pose in (platform, carriers))
+                slack = limits.distances(limit, *middle).min(axis=1) - limit.low
+                rows = np.flatnonzero(slack[:, None] - limit.per_metre * moved < CLEARANCE)
+            values = limits.distances(limit, *(_at_rest(pose[rows]) for pose in (platform, carriers)))
+        for side in (limit.low + CLEARANCE - values, values - limit.high + CLEARANCE):
+            beyond[rows] += np.maximum(side, 0.0).sum(axis=1)
     return beyond
+
+
+def _at_rest(pose: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return pose, np.zeros_like(pose), np.zeros_like(pose)
 
 
 def _best(scenario: Scenario, places: _References, tried: np.ndarray, span: np.ndarray) -> np.ndarray:
     """Return the cheapest sequence of formations (k, 4) among those tried at each point, (k, tries, 4)."""
     count, tries, _ = tried.shape
     every = _References(*(np.repeat(part, tries, axis=0) for part in (places.platform, places.carriers, places.across)))
-    passed = _beyond(scenario, *_placed(scenario, every, tried.reshape(-1, 4))).reshape(count, tries)
+    passed = _beyond(scenario, *_placed(scenario, every, tried.reshape(-1, 4)), tries).reshape(count, tries)
     size = tried / np.where(span > 0, span, 1.0)
     squares = (size**2).sum(axis=2)
     cost = VIOLATION * passed + UNUSUAL * squares

@@ -138,6 +138,7 @@ def _tightened(scenario: Scenario, audit: Audit, before: Shares, factor: float =
             if limit.name == excess.limit and limit.is_about(excess.about) and limit.tightens:
                 # All that a limit is about is reduced by the largest share so far.
                 own = [share for name, about, share in before if name == limit.name and limit.is_about(about)]
-                share = max(own, default=0.0) + factor * limit.share_beyond(excess.value)
+                value = excess.value if excess.between is None else excess.between
+                share = max(own, default=0.0) + factor * limit.share_beyond(value)
                 shares[excess.limit, excess.about] = min(share, LARGEST_SHARE)
     return tuple((*key, share) for key, share in shares.items())

@@ -33,6 +33,7 @@ NEAR = 0.08  # of a motion's extent: where a place is, of which a program has ro
 FEW = 8  # regions
 ROUNDS = 4  # of rows that are added where a solution exceeds what the program leaves out; then it has all
 PASSES = 3
+MOST_COARSE = 150  # iterations of a program that only leads to another: those that end well take 20 to 90
 MOST_AGAIN = 60  # iterations from a solution that is near: more do not lead to one
 APPROACHED = 1e-3  # of a distance's scale: what true distances may miss at the end
 USABLE = 1e-2  # of it: what the true program makes up for
@@ -238,14 +239,14 @@ class Search:
         With `near` it is made again, with those rows.
         """
         start, self.mesh = time.perf_counter(), mesh
+        coarse = mesh.steps < self.scenario.task.steps
+        most = min(self._most_iterations, MOST_COARSE if coarse else MOST_ITERATIONS)
         known = self._solvers.get(mesh)
         again = known is not None and guess is None and known.has_solution  # continues from there, with its own rows
         if near is not None:
-            self._solvers[mesh] = wait_for(
-                lambda: Solver(self._build(self.scenario, mesh, near), self._most_iterations)
-            )
+            self._solvers[mesh] = wait_for(lambda: Solver(self._build(self.scenario, mesh, near), most))
         elif known is None or not (again or np.isfinite(reach) or known.program.near.is_everywhere):
-            self._solvers[mesh] = wait_for(lambda: Solver(self._built(mesh, guess, reach), self._most_iterations))
+            self._solvers[mesh] = wait_for(lambda: Solver(self._built(mesh, guess, reach), most))
         solver = self._solvers[mesh]
         solver.prepare(guess, coarser)
         built = time.perf_counter()

@@ -31,7 +31,10 @@ from .search import Search
 LEAST_PERIOD, INSTANTS = 0.02, 200  # [s], from the beginning of one stop to that of the next; and how many at most
 ONE_OF = 8  # stops is computed first, where it is enough to know that one takes too long
 ROUNDS = 10
-LEAST_STEP, STEP = 1.05, 1.5  # times the duration: at least, and where no stop keeps the tension limits
+LEAST_STEP, LARGEST_STEP = 1.02, 3.0  # times the duration
+STEP = 1.5  # the same, where no stop keeps the tension limits
+LEAST_SLOPE = 0.25  # of the logarithms: by how much stops get shorter at least as the duration gets longer
+AIM = 0.985  # of the time, for stops of the next plan
 CLOSE = 1.01  # times the longest duration that is known to be too short
 NEAR = 0.97  # of the time: stops that take so long are not made longer
 ROUNDING = 1e-9  # of the time
@@ -45,11 +48,12 @@ def stopping_within(
 
     `climb` plans a scenario from a start. The plan is not feasible if no such one is found.
     """
-    best = plan = _judged(first, scenario, seconds)
+    span, begun, tried = scenario.duration_range, time.perf_counter(), 0
+    best = plan = _judged(first, scenario, seconds, None if span is None else [])
     if plan.feasible:
         return plan
-    span, begun, tried = scenario.duration_range, time.perf_counter(), 0
     short, enough = plan, None  # of two durations, the plan that stops too late and the one that stops in time
+    shorter: Plan | None = None  # that stops later still
     suspects: list[float] = []  # shares of the durations at which the longest stops of earlier plans begin
     again = False  # whether the last two durations are on the same side
     shortest = 0.0  # of the durations that `climb` finds
@@ -57,7 +61,7 @@ def stopping_within(
         if plan.feasible and plan.stop.duration >= NEAR * seconds:
             break
         suspects.append(plan.stop.begins / plan.duration)
-        before, target = plan, min(_between(short, enough, seconds, again), span.max)
+        before, target = plan, min(_between(short, enough or shorter, seconds, again and enough is not None), span.max)
         if (span.max if enough is None else enough.duration) <= CLOSE * short.duration:
             break
         if target < shortest:
@@ -74,7 +78,9 @@ def stopping_within(
         if plan.feasible:
             best = enough = plan
         else:
-            short = plan
+            shorter, short = short, plan
+    if not best.feasible and span is not None:
+        best = _judged(first, scenario, seconds)
     if not tried:
         return best
     said = f"{tried} tried" + f", {quantity(best.duration, 's')} suffices" * best.feasible
@@ -97,23 +103,30 @@ def _slowed(plan: Plan, target: float) -> Plan | None:
     return found if audited.passed else None
 
 
-def _between(short: Plan, enough: Plan | None, seconds: float, halfway: bool = False) -> float:
-    """Return the next duration to try [s], from the stops of two plans: they take as long as it is fast.
+def _between(short: Plan, other: Plan | None, seconds: float, halfway: bool = False) -> float:
+    """Return the next duration to try [s], from the stops of a plan that stops too late and of another.
 
-    One `halfway` between both is tried where stops jump, so that what they take does not lead there.
+    They take as long as the motion is fast, or else as the two show. A duration `halfway` between both is tried where
+    stops jump, so that what they take does not lead there.
     """
     stops = [
         np.inf if each is None or each.stop is None or not each.stop.feasible else each.stop.duration
-        for each in (short, enough)
+        for each in (short, other)
     ]
-    if enough is None:
-        return short.duration * (max(stops[0] / seconds, LEAST_STEP) if np.isfinite(stops[0]) else STEP)
+    if other is None or other.duration < short.duration:
+        if not np.isfinite(stops[0]):
+            return short.duration * STEP
+        slope = 1.0
+        if other is not None and stops[0] < stops[1] < np.inf:
+            slope = float(np.log(stops[1] / stops[0]) / np.log(short.duration / other.duration))
+        step = (stops[0] / (AIM * seconds)) ** (1 / np.clip(slope, LEAST_SLOPE, 1.0))
+        return short.duration * float(np.clip(step, LEAST_STEP, LARGEST_STEP))
     known = np.isfinite(stops[0]) and not halfway
-    share = np.log(stops[0] / seconds) / np.log(stops[0] / stops[1]) if known else 0.5
-    return short.duration * (enough.duration / short.duration) ** float(np.clip(share, LEAST_SHARE, 1 - LEAST_SHARE))
+    share = np.log(stops[0] / (AIM * seconds)) / np.log(stops[0] / stops[1]) if known else 0.5
+    return short.duration * (other.duration / short.duration) ** float(np.clip(share, LEAST_SHARE, 1 - LEAST_SHARE))
 
 
-def _judged(plan: Plan, scenario: Scenario, seconds: float, suspects: Sequence[float] = ()) -> Plan:
+def _judged(plan: Plan, scenario: Scenario, seconds: float, suspects: Sequence[float] | None = None) -> Plan:
     """Return a plan as one of the scenario's task, with its longest stop; not feasible if that takes too long.
 
     With `suspects`, shares of the duration, stops that begin there and some others come first: if one takes too long,
@@ -128,7 +141,7 @@ def _judged(plan: Plan, scenario: Scenario, seconds: float, suspects: Sequence[f
     if not len(times):
         return plan
     first = np.zeros(len(times), dtype=bool)
-    if suspects:
+    if suspects is not None:
         first[::ONE_OF] = True
         first[[np.abs(times - share * plan.duration).argmin() for share in suspects]] = True
     stops: list[Stop] = []
