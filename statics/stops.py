@@ -155,8 +155,7 @@ def _unloaded(robot: Robot, trajectory: Trajectory, times: list[float]) -> Itera
             yield Stop(robot, float(tau[0]), float(tau[-1]), time, platform, carriers, tensions, None, limit)
         return
     trajectory = continued(trajectory, together=False)
-    # What all stops and attempts have in common.
-    instants = cache(lambda window: _instants(robot, trajectory, WINDOW * window))
+    instants = cache(lambda window: _instants(robot, trajectory, WINDOW * window))  # for all stops and attempts
     bounds = cache(lambda window, reserve: instants(window).bounds(reserve))
     for first in range(0, len(times), AT_ONCE):
         best = dict[float, _Tried]()
