@@ -394,7 +394,7 @@ def _audited(robot: Robot, trajectory: Trajectory, laws: list[_Law]) -> Iterator
         at = some.start + int(np.argmax(missing[some]))
         worst = wrench_problem(robot, A[at], w[at]) if missing[at] > MISSING else None
         limit = overloaded_winch(robot, own.times, lengths[some], tensions[some])
-        motions = (tuple(part[some] for part in motion) for motion in (slowed, moved))
-        found = Stop(robot, *own.tau[[0, -1]].tolist(), own.times, *motions, tensions[some], None, limit)
+        body, bases = ((x[some], v[some], a[some]) for x, v, a in (slowed, moved))
+        found = Stop(robot, float(own.tau[0]), float(own.tau[-1]), own.times, body, bases, tensions[some], None, limit)
         rank = (worst is not None or bool(limit), round(missing[at] / LITTLE), bool(limit), found.duration)
         yield _Tried(rank, found, worst)

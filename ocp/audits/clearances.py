@@ -77,7 +77,8 @@ def _values(audited: Instants, limit: Distance, changes: np.ndarray) -> np.ndarr
         undecided = (last - first > 1) & ~(least.min(axis=1) >= enough)
         inner = np.linspace(first[undecided], last[undecided], PARTS + 1).astype(int)
         more = np.setdiff1d(inner, at)
-    return np.where(known[:, None], values, np.vstack([np.repeat(least, last - first, axis=0), values[-1:]]))
+        values = np.where(known[:, None], values, np.vstack([np.repeat(least, last - first, axis=0), values[-1:]]))
+    return values
 
 
 def _between_nodes(audited: Instants, limit: Distance, time: float, which: int) -> float | None:

@@ -153,12 +153,13 @@ def _beyond(scenario: Scenario, platform: np.ndarray, carriers: np.ndarray, trie
 
     So many `tries` in turn are near each other: from the distances of one those of most others are known to suffice.
     """
-    beyond, limits, rests = np.zeros(len(platform)), scenario.limits, [_at_rest(pose) for pose in (platform, carriers)]
+    beyond, limits = np.zeros(len(platform)), scenario.limits
+    others = limits.along(_at_rest(platform), _at_rest(carriers), distances=False)
     corners, (ends, anchors) = placed(platform, scenario.body_corners), scenario.dynamics.points(platform, carriers)
     points = np.concatenate([ends, anchors, corners, carriers[..., :3]], axis=1)
     points = points.reshape(-1, tries, *points.shape[1:])
     moved = np.linalg.norm(points - points[:, tries // 2, None], axis=3).max(axis=2)
-    for limit, values in zip(limits, limits.along(*rests, distances=False), strict=True):
+    for limit, values in zip(limits, others, strict=True):
         if limit.name not in DISTANCES:
             continue
         rows = np.arange(len(platform))
