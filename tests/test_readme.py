@@ -91,7 +91,8 @@ def run_page(page, folder, monkeypatch):
     """Run the blocks of a page in a folder; return the names that its Python defined."""
     monkeypatch.chdir(folder)
     monkeypatch.setenv("CFLAGS", "-O0")  # of exported units: it changes no bit
-    monkeypatch.setattr(search, "AUDITED", 10_000)  # of larger audits, test_design.py has tests
+    monkeypatch.setattr(search, "_SEARCHING", 0.0)  # of longer searches and larger audits, test_design.py has tests
+    monkeypatch.setattr(search, "AUDITED", 10_000)
     monkeypatch.setattr(carriers, "_KINDS", dict(carriers._KINDS))  # other tests know nothing of a page's own carrier
     namespace = {"__name__": "example"}
     for block in blocks(page):
