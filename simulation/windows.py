@@ -326,10 +326,9 @@ class Windows:
                         ends = ends.reshape(count, W, 2, -1)[:, w]
                         part[:, w, s] = (1 - share) * ends[:, :, 0] + share * ends[:, :, 1]
                 states[:] = history[:, 1]
-            out = _seen(plant, *seen)
         speeds = np.take_along_axis(self._cable_speed, number[..., None], axis=1)  # (W, S, m)
         friction = (with_.friction + np.array(with_.cable_friction)) * np.tanh(speeds / SLOW)
-        residuals = self._residuals(out, plant, friction, with_)
+        residuals = self._residuals(*seen, plant, friction, with_)
         residuals[1:] = (residuals[1:] - residuals[0]) / self._steps_of_start[:, None, None] if nudged else 0.0
         return residuals
 
@@ -353,19 +352,23 @@ class Windows:
             actuation[:, :, index, 0] = np.interp(middle, self.recorded.times, self.recorded.thrusts[:, index])
         return plant.command(np.ones(self.robot.m), actuation, *self._carried), cables
 
-    def _residuals(self, out: np.ndarray, plant: Plant, friction: np.ndarray, with_: Parameters) -> np.ndarray:
-        """Return measured minus simulated over noise, (V, W, R), from what `_seen` returns, (V, W, S, 7 + 2 m).
+    def _residuals(
+        self, states: np.ndarray, tensions: np.ndarray, plant: Plant, friction: np.ndarray, with_: Parameters
+    ) -> np.ndarray:
+        """Return measured minus simulated over noise, (V, W, R), of states (V, W, S, n) and tensions (V, W, S, m).
 
         Winches that follow lengths overcome their friction (W, S, m) [N]: it shows only in tensions that are measured
         behind it, as by motor currents.
         """
         of, rows, inside, parts = self.recorded, self.rows, self.inside[..., None], {}
-        position, quaternion, tensions, lengths = np.split(out, [3, 7, 7 + self.robot.m], axis=-1)
+        motions, lengths = (part[..., 0, :] for part in sensed(plant.robot, states))
+        position, q = motions[..., :3], states[..., layout.QUATERNION : layout.VELOCITY]
+        quaternion = np.where(np.isfinite(q).all(axis=-1, keepdims=True), q, 1.0)[..., [1, 2, 3, 0]]
         known = inside & self._known[rows][..., None]
         if "position" in self.noise:
             parts["position"] = np.where(known & of.measured[:3], of.pose[rows, :3] - position, 0.0)
         if "rotation" in self.noise:
-            recorded = np.broadcast_to(self._rotation[rows], (len(out), *rows.shape, 3, 3)).reshape(-1, 3, 3)
+            recorded = np.broadcast_to(self._rotation[rows], (len(states), *rows.shape, 3, 3)).reshape(-1, 3, 3)
             away = Rotation.from_matrix(recorded) * Rotation.from_quat(quaternion.reshape(-1, 4)).inv()
             moves = known & (of.robot.dof_mask[3:] > 0)
             parts["rotation"] = np.where(moves, away.as_rotvec().reshape(position.shape), 0.0)
@@ -382,11 +385,3 @@ class Windows:
         self.widths = [part.shape[-1] for part in parts.values()]
         whole = np.concatenate([part / self.noise[name] for name, part in parts.items()], axis=-1)
         return whole.reshape(*whole.shape[:2], -1)
-
-
-def _seen(plant: Plant, states: np.ndarray, tensions: np.ndarray) -> np.ndarray:
-    """Return position, quaternion (x, y, z, w), tensions and lengths of states (..., size), (..., 7 + 2 m)."""
-    motions, lengths = sensed(plant.robot, states)
-    q = states[..., layout.QUATERNION : layout.VELOCITY]
-    quaternion = np.where(np.isfinite(q).all(axis=-1, keepdims=True), q, 1.0)[..., [1, 2, 3, 0]]
-    return np.concatenate([motions[..., 0, :3], quaternion, tensions, lengths[..., 0, :]], axis=-1)
