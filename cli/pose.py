@@ -126,7 +126,7 @@ def _of_log(robot: Robot, logs: list[Path], fields: Path | None, sigma: str, out
             size = quantity(middle, "mm" if i < 3 else "mrad", 3) if np.isfinite(middle) else "undetermined"
             size = size if robot.dof_mask[i] else "fixed"
             typer.echo(f"  median sigma of {name}: {size}")
-        for line in (*read.notes, *found.lines()):
+        for line in (_included(found.estimate), *read.notes, *found.lines()):
             typer.echo(f"  {line}")
         print_written(files)
     if data["consistent"] < FEWEST_FIT or data["doubt"]:
@@ -138,6 +138,16 @@ def _same(robot: Robot, one: PoseEstimate, other: PoseEstimate) -> bool:
 
     turned = (one.pose[3:] - other.pose[3:] + np.pi) % (2 * np.pi) - np.pi
     return bool(np.abs(one.pose[:3] - other.pose[:3]).max() < 0.01 * robot.length and np.abs(turned).max() < 0.01)
+
+
+def _included(estimate: PoseEstimate) -> str:
+    """Return the errors that the sigmas of an estimate include."""
+    import numpy as np
+
+    known = estimate.robot.uncertainty is not None
+    file = "and the robot file's uncertainty" if known else "only, because the robot file has no uncertainty"
+    weight = ", but no errors of the CoM" if np.any(estimate.by_gravity) else ""
+    return f"The sigmas include noise of the measurements {file}{weight}."
 
 
 def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> None:
@@ -159,6 +169,7 @@ def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> N
     print_table(["", "estimate", "sigma"], rows, "lrr")
     if robot.dof_mask[3:].any():
         typer.echo("The sigmas of the angles are those of small rotations about the axes of {G}.")
+    typer.echo(_included(estimate))
     if estimate.by_gravity and estimate.converged:
         typer.echo("The lengths do not determine the pose. This is the equilibrium pose.")
     if estimate.consistent and not estimate.determined:

@@ -9,12 +9,14 @@ from towline import InputError, Robot, load
 from towline.estimation import pose_from_lengths
 from towline.estimation.calibration import Measurements, calibrate
 from towline.estimation.logs.encoders import lengths_of, readings_of
+from towline.estimation.pose.from_log import poses_from_log
 from towline.estimation.pose.parameter_errors import length_errors
 from towline.estimation.pose.residual_tests import squares_of
 from towline.models import Dynamics, Uncertainty, points
 from towline.statics.robust import uncertainty_of
 
 from .robots_as_built import as_built, random_poses
+from .user_recordings import FRAME, PLATFORM, robot_file
 
 
 def normalised(estimate, poses):
@@ -135,3 +137,21 @@ def test_squared_residuals_are_the_least_of_all_poses(name):
     np.testing.assert_allclose(found, least, rtol=1e-6)
     shifted = residuals + 1e-3 * J[0][:, free].sum(axis=1)
     np.testing.assert_allclose(squares_of(robot, pose, shifted, sigma, robot.carrier_home), least, rtol=1e-3)
+
+
+def test_hanging_poses_of_a_log_include_the_uncertainty_of_the_file(tmp_path):
+    """Four cables and an AHRS: the poses of a robot with another anchor differ as the covariance says."""
+    robot, sigma = load(robot_file(tmp_path / "crane.yaml", FRAME, PLATFORM, [0, 0, 1, 0, 0, 0])), 1e-4
+    level = np.array([[0.3, -0.2, 1.1, 0, 0, 0], [-0.5, 0.4, 0.8, 0, 0, 0]])
+    rest = pose_from_lengths(robot, Dynamics(robot).cable_lengths(level), level).pose
+    log = Measurements(Dynamics(robot).cable_lengths(rest), orientations=rest[:, 3:], sigma={"rotation": 0.01})
+    name = "cables[1].anchor.x"
+    one = Uncertainty(parameters=(name,), covariance=((sigma**2,),))
+    there = poses_from_log(robot.model_copy(update={"uncertainty": one}), log).estimate
+    other = poses_from_log(robot.with_parameters({name: robot.parameter_values([name])[0] + sigma}), log).estimate
+    assert there.by_gravity.all()
+    change = (other.pose - there.pose)[:, :3]
+    assert np.linalg.norm(change, axis=1).min() > sigma / 5
+    np.testing.assert_allclose(
+        there.by_parameters[:, :3, :3], change[:, :, None] * change[:, None], rtol=0.02, atol=1e-11
+    )

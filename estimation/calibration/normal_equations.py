@@ -14,7 +14,7 @@ of its own cable and of the robot, so the normal matrix is assembled from blocks
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ from ..pose.estimate import unbounded
 from .curvature import curvature
 from .geometry import length_of
 from .model import STILL, Derivatives, Model, Residuals, State
-from .parameters import OF_CABLE, OF_ROBOT
+from .parameters import COLUMNS, IN_FILE, OF_CABLE, OF_ROBOT, Parameters
 from .products import inner
 from .sightings import SEEN
 
@@ -289,3 +289,19 @@ def pose_covariances(model: Model, state: State) -> np.ndarray:
     open_ = values[..., None] ** 2 > LARGEST_VARIANCE
     root = np.where(open_, 0.0, values[..., None] * V)
     return unbounded(np.swapaxes(root, 1, 2) @ root, np.swapaxes(np.where(open_, V, 0.0), 1, 2))
+
+
+def pose_covariances_by_file(model: Model, state: State) -> np.ndarray:
+    """Return the covariances (N, 6, 6) of poses by the `uncertainty` of the robot file, zero without any."""
+    uncertain = model.robot.uncertainty
+    if uncertain is None or not model.poses_vary.any():
+        return np.zeros((len(state.shift), 6, 6))
+    whole = replace(model, parameters=Parameters(model.robot, tuple(COLUMNS)[:6]))  # those of geometry
+    equations, scale = NormalEquations.at(whole, state, metric(whole)), metric(whole)
+    assert equations.inverse_root is not None
+    assert equations.Y is not None
+    named = {f"cables[{i}].{word}": OF_CABLE * i + k for i in range(model.robot.m) for k, word in IN_FILE.items()}
+    where = np.array([named[name] for name in uncertain.parameters])
+    own = np.searchsorted(np.flatnonzero(whole.parameters.varies), where)
+    motions = np.swapaxes(equations.inverse_root, 1, 2)[:, :6] @ equations.Y[..., own] * scale[where]  # (N, 6, p)
+    return np.asarray(motions @ uncertain.matrix @ np.swapaxes(motions, 1, 2))

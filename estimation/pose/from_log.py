@@ -247,7 +247,8 @@ def _by_more(robot: Robot, given: Measurements, sigma: np.ndarray, begin: float,
     measured = (misread.corrected if misread else measured) if oriented else measured.without_poses()
     weights = sigma.min() / sigma
     blocks = [_block(robot, measured.only(slice(k, k + BLOCK)), weights) for k in range(0, len(given), BLOCK)]
-    poses, left, squares, covariances, converged = (np.concatenate(part) for part in zip(*blocks, strict=True))
+    parts = (np.concatenate(part) for part in zip(*blocks, strict=True))
+    poses, left, squares, covariances, by_parameters, converged = parts
     balanced = needs_balance(robot, measured)
     freedoms = int(robot.dof_mask.sum())
     of_forces = freedoms if measured.tensions is not None else max(freedoms - robot.m, 0)
@@ -263,8 +264,9 @@ def _by_more(robot: Robot, given: Measurements, sigma: np.ndarray, begin: float,
         converged=converged,
         sigma=sigma,
         carrier_pose=given.carrier_poses,
-        by_gravity=np.full(len(given), balanced and robot.m < freedoms),
+        by_gravity=np.full(len(given), hanging := balanced and robot.m < freedoms),
         known_covariance=excess**2 * covariances,
+        by_parameters=by_parameters if hanging and robot.uncertainty else None,
     )
     times = None if given.times is None else given.times + begin
     if misread is not None:
@@ -273,8 +275,11 @@ def _by_more(robot: Robot, given: Measurements, sigma: np.ndarray, begin: float,
 
 
 def _block(robot: Robot, measured: Measurements, weights: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return poses (k, 6), residuals of lengths (k, m) [m], sums of squares, covariances and success of samples."""
-    from ..calibration.normal_equations import pose_covariances
+    """Return poses (k, 6), residuals of lengths (k, m) [m], sums of squares, covariances and success of samples.
+
+    Covariances are those by noise, and by the file's `uncertainty`, (k, 6, 6).
+    """
+    from ..calibration.normal_equations import pose_covariances, pose_covariances_by_file
     from ..calibration.solving import lengths_of as lengths_left
     from ..calibration.solving import model_of
     from ..calibration.starts import fit_from
@@ -288,5 +293,6 @@ def _block(robot: Robot, measured: Measurements, weights: np.ndarray) -> tuple[n
         lengths_left(model, found.state),
         model.residuals(found.state).of_samples,
         pose_covariances(model, found.state),
+        pose_covariances_by_file(model, found.state),
         np.full(len(measured), found.converged),
     )
