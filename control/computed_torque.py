@@ -15,7 +15,7 @@ from ..models.files import AnyRobot, as_robot
 from ..models.record import record_of
 from ..solvers.in_place import InPlace
 from .as_floats import ROUNDING, as_floats, is_time, measured_at, rows_of
-from .bandwidths import DELAY, HELD, PERIOD, SWINGING, bandwidths_for, place_for
+from .bandwidths import DELAY, HELD, PERIOD, SWINGING, age_of, bandwidths_for, noise_of, place_for
 from .carried_load import CarriedLoad
 from .command import NOTHING, NOWHERE, PLANNED, SHIFTED, SOFT, Command
 from .controllability import uncontrolled
@@ -92,9 +92,9 @@ class ComputedTorque(Controller):
         tension_lag, rotor_lag: Known time constants with which winches and actuators of flying carriers follow commands
             [s]. Commands are sent ahead of time, within limits and rates, so that only 5 ms of the first and 15 ms of
             the second remain.
-        sensors: Errors and delay of the sensors, a `simulation.Noise` or a mapping (default: unknown). The default
-            bandwidths are then the largest that these sensors permit (control/bandwidths.py), at most twice those
-            above.
+        sensors: Errors and delay of the sensors, a `simulation.Noise` or a mapping (default: unknown), which is the age
+            of states without a time. The default bandwidths are then the largest that these sensors permit
+            (control/bandwidths.py), at most twice those above.
 
     Raises:
         InputError: If an argument has a wrong value, or these sensors are too slow to control the robot.
@@ -125,7 +125,8 @@ class ComputedTorque(Controller):
         few, self._limits = self.robot.m < len(self.robot.platform.dof), limits_of(self.robot, rate)
         rotors, usual = number("rotor_lag", rotor_lag, 0.0, 0.1), SWINGING if few else HELD
         loops = bandwidths_for(self.robot, usual, sensors, rotors, bandwidth, observer, attitude)
-        held = place_for(loops.attitude, place)
+        held, age = place_for(loops.attitude, place), 0.0 if sensors is None else age_of(noise_of(sensors))
+        self._known_age = age * (age <= OLDEST)  # of states without a time
         if carrier_bandwidth is None:
             steady = not few and any(carrier.efforts for carrier in self.robot.carriers)
             carrier_bandwidth = held / 4 if steady else QUICK
@@ -267,7 +268,7 @@ class ComputedTorque(Controller):
         if reference.load is not self._carried.load:
             self._robot = self._carried.change(reference.load, -np.inf if self._time is None else time)
         self._senses = state.tensions is not None
-        seen = time if state.time is None else measured_at(state.time, time)
+        seen = time - self._known_age if state.time is None else measured_at(state.time, time)
         since = 0.0 if self._time is None else seen - self._seen
         late = self._late_by(time - seen, dt) if self._flies else 0.0
         if dt + late > self._longest and not 0 < self._elapsed <= self._longest - late:

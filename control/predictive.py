@@ -143,6 +143,7 @@ class Predictive(ComputedTorque):
         self._beside = ComputedTorque(the_robot, reach=given, sensors=sensors, rotor_lag=rotor_lag, **loops)
         loops |= {"tension_loop": tension_loop, "tension_lag": tension_lag, "rotor_lag": rotor_lag}
         super().__init__(the_robot, observer=own.observer, reach=reach, **loops)
+        self._known_age = self._beside._known_age
         set_reach(self._settings, reacts)
         self._followed, self._far = np.flatnonzero(flies & ~far.any(axis=1)), (far, flies)
         # Cables of a fixed length have the tensions that carriers make of them, whatever is commanded.
