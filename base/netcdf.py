@@ -50,11 +50,11 @@ class Contents(NamedTuple):
     @classmethod
     def of(cls, dataset: xr.Dataset) -> Contents:
         """Return the contents of a dataset."""
-        plain = (
+        variables, coordinates = (
             {str(name): Variable(tuple(map(str, one.dims)), one.values, one.attrs) for name, one in part.items()}
             for part in (dataset.data_vars, dataset.coords)
         )
-        return cls(*plain, dataset.attrs)
+        return cls(variables, coordinates, dataset.attrs)
 
     def get(self, name: str) -> Variable | None:
         """Return a variable or coordinate, or None if there is none of that name."""

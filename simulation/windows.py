@@ -328,7 +328,7 @@ class Windows:
                 states[:] = history[:, 1]
         speeds = np.take_along_axis(self._cable_speed, number[..., None], axis=1)  # (W, S, m)
         friction = (with_.friction + np.array(with_.cable_friction)) * np.tanh(speeds / SLOW)
-        residuals = self._residuals(*seen, plant, friction, with_)
+        residuals = self._residuals(seen[0], seen[1], plant, friction, with_)
         residuals[1:] = (residuals[1:] - residuals[0]) / self._steps_of_start[:, None, None] if nudged else 0.0
         return residuals
 
