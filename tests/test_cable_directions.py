@@ -149,7 +149,7 @@ def test_azimuths_of_swivels_add_what_lengths_lack(tmp_path):
     assert np.isnan(read.directions[..., 2]).all()
     better, worse = (
         np.abs(poses_from_log(robot, one, 0.05).estimate.pose - poses)[:, :2].max()
-        for one in (read, read.with_directions(None))
+        for one in (read, read.changed(directions=None))
     )
     assert better < 0.03
     assert worse > 2 * better

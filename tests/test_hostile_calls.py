@@ -413,7 +413,6 @@ VALID: dict[str, Callable[[], Any]] = {
     "poses": lambda: measurements().poses,
     "orientations": lambda: None,
     "Measurements.tensions": lambda: None,
-    "Measurements.with_carriers.tensions": lambda: None,
     "Measurements.times": lambda: np.arange(9.0),
     "carrier_poses": lambda: np.zeros((9, 1, 6)),
     "directions": lambda: None,

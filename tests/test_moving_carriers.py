@@ -135,8 +135,8 @@ def test_directions_of_some_cables_move_with_their_carriers_clocks(recording):
     seen = np.stack([CubicSpline(t, true[:, i])(t - by) for i, by in enumerate(late)], axis=1)
     for directions in (true, seen):
         directions[200:240, 0], directions[:, 1, 2], directions[:, 2] = np.nan, np.nan, np.nan
-    there = _Recorded(load(NAME), log.with_directions(seen)).at(late).directions
-    expected = log.with_directions(true).directions
+    there = _Recorded(load(NAME), log.changed(directions=seen)).at(late).directions
+    expected = log.changed(directions=true).directions
     np.testing.assert_array_equal(np.isnan(there), np.isnan(expected))
     inner = np.r_[20:190, 250:580]  # without ends and gaps, across which curves bend
     np.testing.assert_allclose(there[inner], expected[inner], atol=1e-3)
@@ -160,7 +160,7 @@ def test_clocks_of_carriers_are_fitted_and_part_of_the_sigmas(recording, poses, 
     assert (found[:, 1] < (0.015 if poses == 3 else 1e-3)).all()
     assert all(abs(one.correction - true) < 4 * one.sigma for one, true in zip(result.parameters, MORE, strict=False))
     if poses == 6:  # an unknown attitude follows wrong clocks
-        known = calibrate(NAME, given.with_sigma({**sigma, "clocks": 0.0}), ("offsets", "mass"), outliers=False)
+        known = calibrate(NAME, given.changed(sigma={**sigma, "clocks": 0.0}), ("offsets", "mass"), outliers=False)
         assert known.noise > 3 * result.noise
         assert "quad2.clock" in str(result.report())
 

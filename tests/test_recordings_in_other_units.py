@@ -80,7 +80,7 @@ def test_drums_that_turn_the_other_way(signs, tmp_path):
 def test_readings_of_any_size_and_order(columns, units, tmp_path):
     path, _ = drum_angles(tmp_path)
     robot, read = load(path), read_measurements(tmp_path / "angles.csv", robot=path)
-    found = correction_of(robot, read.with_lengths((read.lengths * RADIUS / units)[:, np.argsort(columns)]))
+    found = correction_of(robot, read.changed(lengths=(read.lengths * RADIUS / units)[:, np.argsort(columns)]))
     assert len(found.texts) == 1
     np.testing.assert_allclose([one.encoder.scale for one in found.robot.cables], units, rtol=0.017)
     np.testing.assert_allclose(found.measurements.lengths, read.lengths * RADIUS / units, rtol=1e-9)
@@ -111,7 +111,7 @@ def test_signs_and_units_become_encoders(tmp_path):
     user.four_cables(tmp_path)
     robot = load(user.hanging_robot(tmp_path))
     read = read_measurements(tmp_path / "winches.csv", poses=tmp_path / "mocap.csv", robot=robot)
-    log = read.with_lengths(1e3 * read.lengths * [1, -1, 1, 1])
+    log = read.changed(lengths=1e3 * read.lengths * [1, -1, 1, 1])
     found = correction_of(robot, log)
     assert not found.counted  # millimetres are exact
     assert found.measurements is not log

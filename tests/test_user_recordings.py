@@ -12,7 +12,6 @@ from towline.estimation.calibration import attitudes, calibrate
 from towline.estimation.calibration.plausibility import mistake
 from towline.estimation.calibration.solving import usual
 from towline.estimation.logs import read_log
-from towline.estimation.logs.measurements import changed
 from towline.estimation.logs.tables import from_csv
 
 from . import user_recordings as user
@@ -216,7 +215,7 @@ def test_offsets_turn_a_small_platform_as_another_heading_does(heading, tmp_path
     user.statics(tmp_path, offsets)
     given = read_measurements(tmp_path / "statics.csv", robot=robot, sigma={"lengths": 1e-3, "rotation": 0.009})
     turned = Rotation.from_euler("z", heading, degrees=True) * Rotation.from_euler("xyz", given.poses[:, 3:])
-    found = mistake(robot, changed(given, poses=np.hstack([given.poses[:, :3], turned.as_euler("xyz")])))
+    found = mistake(robot, given.changed(poses=np.hstack([given.poses[:, :3], turned.as_euler("xyz")])))
     if heading == 0:
         assert found is None
         return
@@ -240,7 +239,7 @@ def test_without_a_fit_only_clear_differences_of_orientations_are_errors(tmp_pat
     for heading, clear in ((4, False), (25, True)):
         turned = Rotation.from_euler("z", heading, degrees=True) * Rotation.from_euler("xyz", given.poses[:, 3:])
         poses = np.hstack([given.poses[:, :3], turned.as_euler("xyz")])
-        assert (attitudes.misread_attitudes(robot, changed(given, poses=poses)) is not None) == clear
+        assert (attitudes.misread_attitudes(robot, given.changed(poses=poses)) is not None) == clear
 
 
 def test_a_motion_capture_that_repeats_the_last_pose(tmp_path):

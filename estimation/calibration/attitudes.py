@@ -15,7 +15,7 @@ from ...base.text import quantity, quantity_row
 from ...models import points
 from ...models.robot import Robot
 from ..logs.encoders import lengths_of
-from ..logs.measurements import Measurements, changed, measured_poses
+from ..logs.measurements import Measurements, measured_poses
 from ..pose.from_lengths import pose_from_lengths
 from .geometry import length_of
 from .interpretations import interpretations
@@ -120,7 +120,7 @@ def _turned(given: Measurements, rotation: Rotation) -> Measurements:
     """Return measurements with other orientations where they were measured."""
     assert given.poses is not None
     angles = np.where(np.isfinite(given.poses[:, 3:]), points.angles(rotation.as_matrix()), np.nan)
-    return changed(given, poses=np.hstack([given.poses[:, :3], angles]))
+    return given.changed(poses=np.hstack([given.poses[:, :3], angles]))
 
 
 def _fitted(robot: Robot, given: Measurements) -> tuple[float, np.ndarray]:

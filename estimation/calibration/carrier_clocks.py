@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from ...models import points
 from ...models.robot import Robot
-from ..logs.measurements import Measurements, changed
+from ..logs.measurements import Measurements
 from ..logs.smoothing import continuous, smooth, within
 from .balance import Balance
 from .carrier_motion import CarrierMotion
@@ -147,7 +147,7 @@ class _Recorded:
                 part[:, own] = later[:, first : first + size].reshape(len(part), *part[0, own].shape)
                 first += size
         named = {("tensions" if part.ndim == 2 else "directions"): part for part in new}
-        return changed(given, carrier_poses=poses, **named, sigma={**given.sigma._asdict(), "clocks": 0.0})
+        return given.changed(carrier_poses=poses, **named, sigma={**given.sigma._asdict(), "clocks": 0.0})
 
     def model(self, model: Model, ahead: np.ndarray) -> Model:
         """Return a model with these measurements."""

@@ -42,7 +42,7 @@ def corrected(robot: Robot, measurements: Measurements) -> tuple[Measurements, l
     found = correction_of(robot, measurements)
     first, last = (Parameters(one, ()).table(Parameters(one, ()).first)[:, 7] for one in (as_robot(robot), found.robot))
     lengths = found.measurements.lengths * (last / first)
-    return (found.measurements.with_lengths(lengths) if found.texts else measurements), found.texts
+    return (found.measurements.changed(lengths=lengths) if found.texts else measurements), found.texts
 
 
 def correction_of(robot: Robot, measurements: Measurements) -> Correction:
@@ -57,7 +57,7 @@ def correction_of(robot: Robot, measurements: Measurements) -> Correction:
         texts.append(found.text)
         sizes = np.broadcast_to(found.factors, robot.m)
         counted |= not set(np.abs(sizes).tolist()) <= {1.0, *FACTORS}
-        measurements = found.corrected.with_lengths(found.corrected.lengths / sizes)
+        measurements = found.corrected.changed(lengths=found.corrected.lengths / sizes)
         robot = _scaled(robot, sizes)
     return Correction(robot, measurements, texts, counted)
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...models import points
-from ..logs.measurements import ARRAYS, changed
+from ..logs.measurements import ARRAYS
 from ..pose.estimate import largest_cost
 from ..pose.wrong_lengths import TOLD_APART
 from .fit import fit, held
@@ -262,7 +262,7 @@ def _copies(model: Model, state: State, samples: np.ndarray, weights: np.ndarray
         position, rotation = model.poses(model.begin()._replace(x=state.x))
         at = np.hstack([position, points.angles(rotation)])
         of_samples["poses"] = np.where(np.isfinite(model.pose_sigmas[:, :6]), at, np.nan)
-    copies = changed(given, **{name: None if of is None else of[samples] for name, of in of_samples.items()})
+    copies = given.changed(**{name: None if of is None else of[samples] for name, of in of_samples.items()})
     felt = model.felt and model.felt.only(samples)
     return Model(parameters, copies, {}, weights, poses, felt=felt)
 

@@ -24,7 +24,7 @@ from ...models import points
 from ...models.files import as_robot
 from ...models.robot import Robot
 from ..logs.clocks import LIKE, SURELY, realigned
-from ..logs.measurements import Measurements, changed, check_measurements, measured, measured_poses, tracked
+from ..logs.measurements import Measurements, check_measurements, measured, measured_poses, tracked
 from .attitudes import misread_attitudes
 from .differences import AS_GIVEN, FEWEST, PLAUSIBLE, LogPart, medians
 from .frames import Frames, displaced_frames, fitted_frames, in_convention
@@ -178,7 +178,7 @@ def _corrected(
         poses = np.where(np.isfinite(poses), np.hstack([position, points.angles(rotation)]), np.nan)
     tensions = None if given.tensions is None else given.tensions[:, columns]
     lengths = given.lengths[:, columns] * factors
-    result = changed(given, lengths=lengths, poses=poses, tensions=tensions, carrier_poses=carriers)
+    result = given.changed(lengths=lengths, poses=poses, tensions=tensions, carrier_poses=carriers)
     result.framed = framed or given.framed
     return result
 
@@ -342,7 +342,7 @@ def _too_large(robot: Robot, given: Measurements, readings: np.ndarray) -> Mista
         f"the lengths look like {unit}: they change by {quantity(change, 'm', digits=3)}, and a cable of "
         f"{robot.name} is about {quantity(length, 'm', digits=3)} long"
     )
-    corrected = given.with_lengths(given.lengths * factor) if factor else None
+    corrected = given.changed(lengths=given.lengths * factor) if factor else None
     return Mistake(text, corrected, factors=factor or 1.0)
 
 

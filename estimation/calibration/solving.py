@@ -327,7 +327,7 @@ def cleaned(solved: Solved) -> tuple[Measurements, np.ndarray]:
     model, x = solved.model, solved.fit.state.x
     given = model.measurements
     lengths = given.lengths + (model.slips(x) / model.parameters.table(x)[:, 7:8]).T
-    return given.with_lengths(lengths), model.weights
+    return given.changed(lengths=lengths), model.weights
 
 
 def lengths_of(model: Model, state: State) -> np.ndarray:

@@ -96,7 +96,7 @@ def _by_forces(model: Model, state: State, length: float) -> State:
         return state
     sigma = model.measurements.sigma._asdict() | {"lengths": FAR * length}
     fixed = replace(model.parameters, groups=())
-    loose = replace(model, parameters=fixed, measurements=model.measurements.with_sigma(sigma), upright=UPRIGHT)
+    loose = replace(model, parameters=fixed, measurements=model.measurements.changed(sigma=sigma), upright=UPRIGHT)
     at_home = np.where(np.isinf(model.pose_sigmas[:, :1]), model.robot.home[:3] - model.poses(state)[0], state.shift)
     level, home = (fit(loose, start, length).state for start in (state, state._replace(shift=at_home)))
     nearer = loose.residuals(level).of_samples <= loose.residuals(home).of_samples
@@ -120,7 +120,7 @@ def _rough(model: Model, state: State, length: float) -> tuple[Model, State]:
             state = state._replace(x=state.x.copy())
             parameters.table(state.x)[:, 6] += misfit
     prior = {name: value for name, value in near.items() if name in parameters.groups} | model.prior
-    measurements = model.measurements.with_sigma(sigma)
+    measurements = model.measurements.changed(sigma=sigma)
     return replace(model, measurements=measurements, prior=prior, upright=UPRIGHT), state
 
 

@@ -15,7 +15,7 @@ from .cable_directions import vectors
 from .carrier_poses import angles_at, carriers_at
 from .encoders import locked
 from .mapping import Field, LogMap, carrier_fields
-from .measurements import Measurements, changed, measured_poses, tracked
+from .measurements import Measurements, measured_poses, tracked
 from .north_east_down import from_ned, ned_frame, platform_from_ned
 from .pose_track import PoseTrack, unit_quaternions
 from .recording import Recording, Samples, check_rising
@@ -140,7 +140,7 @@ def realigned(
     track = PoseTrack((times - clock.offset) / clock.rate, position, rotation, known).at_times(times[rows])
     position, rotation = track.at(0.0)[:2]
     moved = np.where(np.isfinite(poses[rows]), np.hstack([position, points.angles(rotation)]), np.nan)
-    return changed(measurements.only(rows), poses=moved).only(track.inside(0.0)), clock
+    return measurements.only(rows).changed(poses=moved).only(track.inside(0.0)), clock
 
 
 class Seen(NamedTuple):

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from ...base.display import Displayed
 from ...base.errors import InputError
-from ...base.inputs import file_path, number, real_array, required, shown
+from ...base.inputs import file_path, number, one_of, real_array, required, shown
 from ...base.netcdf import Contents, Variable, save_netcdf
 from ...models import points
 from ...models.part import COORDINATES, LARGEST
@@ -128,42 +128,27 @@ class Measurements(Displayed):
                 for name, array in arrays.items():
                     setattr(part, name, None if array is None else array[rows])
                 return part
-            return changed(self, **{name: None if array is None else array[rows] for name, array in arrays.items()})
+            return self.changed(**{name: None if array is None else array[rows] for name, array in arrays.items()})
         except (IndexError, TypeError, ValueError):
             accepted = f"indices below {len(self)} that rise, flags ({len(self)},) or a slice"
             raise InputError(f"rows must be {accepted}, got {shown(rows)}") from None
 
-    def with_sigma(self, sigma: float | Mapping[str, float]) -> Measurements:
-        """Return the measurements with other standard deviations, as for the class.
+    def changed(self, **new: Any) -> Measurements:
+        """Return the measurements with other arguments, by their names as for the class; None: not measured.
 
-        Raises `InputError` if they have a wrong value.
+        Raises:
+            InputError: If one has a wrong name, shape or value.
         """
-        return changed(self, sigma=sigma)
-
-    def with_lengths(self, lengths: ArrayLike) -> Measurements:
-        """Return the measurements with other lengths (N, m) [m].
-
-        Raises `InputError` if they have a wrong shape or value.
-        """
-        return changed(self, lengths=lengths)
-
-    def with_carriers(self, carrier_poses: ArrayLike, tensions: ArrayLike | None = None) -> Measurements:
-        """Return the measurements with other poses of carriers (N, c, 6) [m, rad], and tensions (N, m) [N] if given.
-
-        Raises `InputError` if they have a wrong shape or value.
-        """
-        return changed(self, carrier_poses=carrier_poses, tensions=self.tensions if tensions is None else tensions)
-
-    def with_directions(self, directions: ArrayLike | None) -> Measurements:
-        """Return the measurements with other directions of cables in {G}, (N, m, 3), as for the class, or without any.
-
-        Raises `InputError` if they have a wrong shape or value.
-        """
-        return changed(self, directions=directions)
-
-    def without_poses(self) -> Measurements:
-        """Return the measurements without poses of the platform."""
-        return changed(self, poses=None)
+        shape = self.lengths.shape
+        if np.shape(new.get("lengths", self.lengths)) != shape:
+            given: dict[str, Any] = {name: getattr(self, name) for name in ARRAYS}
+            other = Measurements(**given | {"sigma": self.sigma._asdict(), **new})
+            other.framed = self.framed
+            return other
+        result = copy(self)  # which shares the arrays that stay: those of a long log are large
+        for name, value in new.items():
+            setattr(result, name, CHECKS[one_of("the name of an argument", name, CHECKS)](value, shape))
+        return result
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save as NetCDF atomically, and return the path; `read_measurements` reads the file.
@@ -199,20 +184,6 @@ class Measurements(Displayed):
             coordinates["time"] = Variable(("time",), self.times, {"units": "s"})
         attributes = {f"sigma_{name}": value for name, value in self.sigma._asdict().items()}
         return save_netcdf(Contents(variables, coordinates, attributes), file_path("path", path))
-
-
-def changed(measurements: Measurements, **new: Any) -> Measurements:
-    """Return measurements with other arguments; raise InputError as the class does."""
-    shape = measurements.lengths.shape
-    if np.shape(new.get("lengths", measurements.lengths)) != shape:
-        given: dict[str, Any] = {name: getattr(measurements, name) for name in ARRAYS}
-        other = Measurements(**given | {"sigma": measurements.sigma._asdict(), **new})
-        other.framed = measurements.framed
-        return other
-    result = copy(measurements)  # which shares the arrays that stay: those of a long log are large
-    for name, value in new.items():
-        setattr(result, name, CHECKS[name](value, shape))
-    return result
 
 
 def check_measurements(robot: Robot, measurements: object) -> Measurements:

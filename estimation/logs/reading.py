@@ -19,7 +19,7 @@ from .encoders import lengths_of
 from .frozen import seen
 from .load_cells import notes as unreadable_notes
 from .mapping import Field, Fields, LogMap, carrier_fields, fields_of, free_axes, listed, read_map
-from .measurements import Measurements, changed
+from .measurements import Measurements
 from .north_east_down import FROM_FRD, FROM_NED, carriers_from_ned, ned_frame, note_of, platform_from_ned
 from .opening import recordings
 from .pose_track import PoseTrack, unit_quaternions
@@ -120,7 +120,7 @@ def read_log(
         read.notes.extend(clocks)
         if apart and not (isinstance(sigma, Mapping) and "clocks" in sigma):
             sigmas = {**read.measurements.sigma._asdict(), "clocks": UNSURE}
-            read = read._replace(measurements=read.measurements.with_sigma(sigmas))
+            read = read._replace(measurements=read.measurements.changed(sigma=sigmas))
         if not carriers:
             return read
         return _with_directions(read if known is None else _with_carriers(read, known, given), known, given)
@@ -170,16 +170,16 @@ def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
         raise InputError("lengths and poses of carriers must have samples at the same times, got none")
     if not kept.all():
         read.notes.append(f"samples skipped because carriers have no poses: {quantity(int((~kept).sum()))}")
-    tensions = pulls = None
     axis = ned_frame(robot, measured.poses, poses)
     if axis is not None:
         poses = carriers_from_ned(robot, poses, axis)
         read.notes.append(note_of(axis, measured.poses))
-        measured = changed(measured, poses=platform_from_ned(robot, measured.poses, axis))
+        measured = measured.changed(poses=platform_from_ned(robot, measured.poses, axis))
+    measured, pulls = measured.only(kept).changed(carrier_poses=poses[kept]), None
     if measured.tensions is None:
-        pulls = pulls_by_thrust(robot, measured.only(kept), poses[kept], thrusts[kept], read.notes)
-        tensions = None if pulls is None else np.linalg.norm(pulls, axis=2)
-    return read._replace(measurements=measured.only(kept).with_carriers(poses[kept], tensions), ned=axis, pulls=pulls)
+        pulls = pulls_by_thrust(robot, measured, poses[kept], thrusts[kept], read.notes)
+        measured = measured if pulls is None else measured.changed(tensions=np.linalg.norm(pulls, axis=2))
+    return read._replace(measurements=measured, ned=axis, pulls=pulls)
 
 
 def _with_directions(read: Log, robot: Robot | None, given: LogMap | None) -> Log:
@@ -209,7 +209,7 @@ def _with_directions(read: Log, robot: Robot | None, given: LogMap | None) -> Lo
     world, note = next(iter(recorded.values())), None
     if robot is not None:
         world, note = in_world(robot, measured, recorded, None if given is None else given.directions_in)
-    seen, notes = measured.with_directions(world), [*read.notes, *([note] if note else [])]
+    seen, notes = measured.changed(directions=world), [*read.notes, *([note] if note else [])]
     if robot is not None and read.pulls is not None and not read.fields.position and seen.directions is not None:
         notes += notes_of_tilts(robot, seen.directions, read.pulls)
     return read._replace(measurements=seen, notes=notes)

@@ -242,9 +242,9 @@ def _by_more(robot: Robot, given: Measurements, sigma: np.ndarray, begin: float,
     from ..calibration.balance import needs_balance
     from ..calibration.sightings import sighted
 
-    measured = given.with_sigma(given.sigma._asdict() | {"lengths": float(sigma.min())})
+    measured = given.changed(sigma=given.sigma._asdict() | {"lengths": float(sigma.min())})
     misread = misread_attitudes(robot, measured) if oriented else None
-    measured = (misread.corrected if misread else measured) if oriented else measured.without_poses()
+    measured = (misread.corrected if misread else measured) if oriented else measured.changed(poses=None)
     weights = sigma.min() / sigma
     blocks = [_block(robot, measured.only(slice(k, k + BLOCK)), weights) for k in range(0, len(given), BLOCK)]
     parts = (np.concatenate(part) for part in zip(*blocks, strict=True))
