@@ -49,7 +49,15 @@ def clock_of_poses(
         check_rising(one)
     shared = min(times[-1], pose_times[-1]) - max(times[0], pose_times[0])
     if source.recording is first.recording and shared >= 0.5 * min(np.ptp(times), np.ptp(pose_times)):
-        return None if robot is None else _far_apart(lengths, position, quaternions, robot, given, from_)
+        if robot is None:
+            return None
+        try:
+            clock = aligned(lengths, position, quaternions, robot, given, from_)
+        except InputError:
+            return None
+        # That of another computer, which stamped the poses, is clearly far from the lengths'.
+        ahead = clock.offset + (clock.rate - 1) * 0.5 * float(times[0] + times[-1])
+        return clock if abs(ahead) > max(FAR_APART, SURELY * clock.sigma) and clock.likeness > LIKE else None
     if locked(lengths.values):
         if shared > 0:
             return None  # constant readings are the same at all times
@@ -57,25 +65,6 @@ def clock_of_poses(
     if robot is None:
         raise InputError("robot must be given to align the clocks of lengths and poses, got None")
     return aligned(lengths, position, quaternions, robot, given, [one for one in from_ if one is source.recording])
-
-
-def _far_apart(
-    lengths: Samples,
-    position: Samples,
-    quaternions: np.ndarray | None,
-    robot: Robot,
-    given: LogMap | None,
-    from_: Sequence[Recording],
-) -> Clock | None:
-    """Return the clock of poses that another computer stamped, None unless it is clearly far from the lengths'."""
-    try:
-        clock = aligned(lengths, position, quaternions, robot, given, from_)
-    except InputError:
-        return None
-    assert lengths.times is not None
-    middle = 0.5 * float(lengths.times[0] + lengths.times[-1])
-    ahead = clock.offset + (clock.rate - 1) * middle
-    return clock if abs(ahead) > max(FAR_APART, SURELY * clock.sigma) and clock.likeness > LIKE else None
 
 
 def aligned(

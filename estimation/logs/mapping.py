@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import PurePath
 from typing import Literal, NamedTuple
@@ -288,23 +288,22 @@ def _usual(
                 lost = _like(members[0], next(i for i in wanted if i not in order))
                 raise InputError(f"must have columns {names[0]} to {names[1]} without a gap, got no {lost}")
             complete.append(tuple(by_name[i] for i in order))
-    if len(complete) > 1 and m is not None and what in ("lengths", "tensions", "commands"):
-        complete = [one for one in complete if len(one) == m] or complete
-    if len(complete) > 1 and what == "lengths":  # winch_1 rather than pulley_1_joint
-        complete = [one for one in complete if not BEHIND_NUMBER.search(one[0].full)] or complete
-    if len(complete) > 1 and what in ("lengths", "tensions", "directions", "thrusts", "thrust_vectors"):
-        complete = [one for one in complete if measured_name(one[0].full) is None] or complete
-    if len(complete) > 1 and what == "lengths":  # l1 rather than angle_1
-        complete = [one for one in complete if not re.search(TURNED, one[0].full.lower())] or complete
-    if len(complete) > 1 and what == "position":  # messages of poses rather than transforms and scenes
-        complete = [one for one in complete if "Pose" in one[0].topic.kind] or complete
+    better: tuple[tuple[str, Callable[[tuple[Field, ...]], bool]], ...] = (
+        ("lengths tensions commands", lambda one: m is None or len(one) == m),
+        ("lengths", lambda one: not BEHIND_NUMBER.search(one[0].full)),  # winch_1 rather than pulley_1_joint
+        ("lengths tensions directions thrusts thrust_vectors", lambda one: measured_name(one[0].full) is None),
+        ("lengths", lambda one: not re.search(TURNED, one[0].full.lower())),  # l1 rather than angle_1
+        ("position", lambda one: "Pose" in one[0].topic.kind),  # messages of poses rather than transforms and scenes
+        (what, lambda one: not position or one[0].topic is position[0].topic),
+    )
+    for of, is_better in better:
+        if len(complete) > 1 and what in of.split():
+            complete = [one for one in complete if is_better(one)] or complete
     if len(complete) > 1 and what == "position":  # of a body that has an orientation, rather than of its markers
         with suppress(InputError):
             turned = _usual(everything, "orientation", None, (), prefix, free)
             stem = re.split(r"(?i)orientation|rotation|quat", turned[0].full)[0] if turned else ""
             complete = [one for one in complete if stem and one[0].full.startswith(stem)] or complete
-    if len(complete) > 1 and position:
-        complete = [one for one in complete if one[0].topic is position[0].topic] or complete
     if len(complete) > 1 and what == "orientation" and {len(one) for one in complete} == {3, 4} and len(complete) == 2:
         raise InputError("must have an orientation as roll, pitch, yaw or as qx, qy, qz, qw, got both")
     if len(complete) > 1:
