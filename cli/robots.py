@@ -155,9 +155,8 @@ def _rest(at_home: TensionSolution) -> list[str]:
     from ..base.text import quantity_range
 
     if at_home.tensions is not None:
-        return [
-            f"  at rest at home: tensions {quantity_range(at_home.tensions.tolist(), 'N')} ({at_home.status.value})"
-        ]
+        tensions = quantity_range(at_home.tensions.tolist(), "N")
+        return [f"  at rest at home: tensions {tensions} ({at_home.status.value})"]
     lines = [f"  cannot rest at home ({at_home.status.value})"]
     if at_home.certificate is not None:
         lines += [f"    {line}" for line in at_home.certificate.describe().splitlines()]

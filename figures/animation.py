@@ -86,11 +86,9 @@ class _Stage:
         scene, seen = self._scene, self._seen
         self._canvas.restore_region(self._still)
         self._trail.set_data(*seen(scene.path[scene.path_times <= self._when.times[k] + 1e-9]).T)
-        bodies = [(scene.platform[k], style.colour(4), self._faces[0])]
-        bodies += [
-            (scene.anchors[k, cables], BODY, found) for cables, found in zip(scene.bodies, self._faces[1:], strict=True)
-        ]
-        sides = [(corners[face], colour) for corners, colour, found in bodies for face in found]
+        bodies = [(scene.platform[k], style.colour(4)), *((scene.anchors[k, cables], BODY) for cables in scene.bodies)]
+        pairs = zip(bodies, self._faces, strict=True)
+        sides = [(corners[face], colour) for (corners, colour), found in pairs for face in found]
         sides.sort(key=lambda side: -seen.depth(side[0]))  # nearer ones cover farther ones
         self._bodies.set_verts([seen(corners) for corners, _ in sides])
         self._bodies.set_facecolor([colour for _, colour in sides])

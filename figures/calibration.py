@@ -135,9 +135,8 @@ def observability(sigmas: Mapping[str, np.ndarray]) -> style.Figure:
         known = np.isfinite(values)
         style_of: dict[str, Any] = {"color": style.colour(index), "linestyle": "none", "marker": style.marker(index)}
         ax.plot(at[known], 1e3 * values[known], markersize=4, label=kind, **style_of)
-        ax.plot(
-            at[np.isinf(values)], np.full(np.isinf(values).sum(), beyond), markersize=4, fillstyle="none", **style_of
-        )
+        unknown = at[np.isinf(values)]
+        ax.plot(unknown, np.full(unknown.shape, beyond), markersize=4, fillstyle="none", **style_of)
     ax.set_yscale("log")
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.yaxis.set_major_formatter("{x:g}")

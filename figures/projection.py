@@ -42,9 +42,8 @@ def views_of(points: np.ndarray, views: Sequence[View], below: float = 0.4) -> t
     # Views share a column if they share the axis across, a row if that up.
     columns, rows = (list(dict.fromkeys(view[k] for view in views)) for k in (1, 2))
     places = [(columns.index(view.across), rows.index(view.up)) for view in views]
-    widths, heights = (
-        {place[k]: float(extent[view[k + 1]]) for view, place in zip(views, places, strict=True)} for k in (0, 1)
-    )
+    placed = list(zip(views, places, strict=True))
+    widths, heights = ({place[k]: float(extent[view[k + 1]]) for view, place in placed} for k in (0, 1))
     free = style.COLUMN - BESIDE - BETWEEN * (len(widths) - 1) - 0.1
     scale = min(free / sum(widths.values()), TALLEST / sum(heights.values()))
     canvas = style.figure(height=scale * sum(heights.values()) + ROW * len(heights) + below)
@@ -57,7 +56,7 @@ def views_of(points: np.ndarray, views: Sequence[View], below: float = 0.4) -> t
     panels: list[style.Axes] = []
     in_column: dict[int, style.Axes] = {}
     in_row: dict[int, style.Axes] = {}
-    for view, (column, row) in zip(views, places, strict=True):
+    for view, (column, row) in placed:
         lowest = row == max(heights)
         ax = canvas.add_subplot(grid[row, column], sharex=in_column.get(column), sharey=in_row.get(row))
         in_column[column] = in_row[row] = ax

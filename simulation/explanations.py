@@ -216,6 +216,5 @@ def _plain(value: np.ndarray) -> Any:
 def tied(found: Sequence[Explanation]) -> list[str]:
     """Return the name that explains most, and those of others that explain as much; none if it explains nothing."""
     least = (1 - TIED) * found[0].explained if found and found[0].named else np.inf
-    return [
-        one.name for one in found if one.named and one.explained >= least and (one is found[0] or one.name in ALONE)
-    ]
+    rivals = [one for one in found if one.named and one.explained >= least]
+    return [one.name for one in rivals if one is found[0] or one.name in ALONE]

@@ -212,11 +212,8 @@ class Replay(Drawn, Reported, Displayed):
         ratios = {name: rms[name] / noise[name] for name in rms}
         first, worst = next(iter(rms)), max(ratios, key=lambda name: ratios[name])
         shown = [first] if ratios[worst] < 2 * max(ratios[first], 1.0) else [first, worst]
-        each = (
-            f"{name.removesuffix('s')} residual {_of(name, rms[name])} rms, noise {_of(name, noise[name])}"
-            for name in shown
-        )
-        text = "; ".join(each)
+        sizes = {name: f"{_of(name, rms[name])} rms, noise {_of(name, noise[name])}" for name in shown}
+        text = "; ".join(f"{name.removesuffix('s')} residual {size}" for name, size in sizes.items())
         if self.windows.recorded.doubt:
             return f"{text}; {self.windows.recorded.doubt}"
         if self.named:
@@ -337,9 +334,8 @@ def _fitted(matching: Matching, most: Explanation) -> tuple[Parameters, tuple[fl
     used, others = matching.kept & fits, matching.kept & ~fits
     best, done = matching.first, set[str]()
     while used.any() and others.any() and (most.name in ALONE or not most.named):
-        found = next(
-            (one for one in matching.explanations(best, used) if one[0].named and one[0].name not in done), None
-        )
+        tried = matching.explanations(best, used)
+        found = next((one for one in tried if one[0].named and one[0].name not in done), None)
         if found is None or found[0].name not in ALONE or found[1].cost[others].sum() > GAIN * best.cost[others].sum():
             break
         done.add(found[0].name)

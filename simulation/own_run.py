@@ -57,9 +57,8 @@ def simulation_of(plant: Plant, history: History, reference: Any = None, toleran
         wanted = read_trajectory(robot, reference, float(history.times[-1]))
         references, doubt, keep_out = references_at(robot, wanted, history.times), wanted.doubt, wanted.keep_out
     gone = plant.read(states).cut  # (K, m)
-    cuts = tuple(
-        Cut(cable=int(i) + 1, at=float(history.times[np.argmax(gone[:, i])])) for i in np.flatnonzero(gone[-1])
-    )
+    at = history.times[gone.argmax(axis=0)].tolist()
+    cuts = tuple(Cut(cable=i + 1, at=at[i]) for i in np.flatnonzero(gone[-1]).tolist())
     conditions = Experiment(period, 1, references, None, np.zeros(6), Noise(), cuts, keep_out, doubt)
     without_controller = np.zeros(0), np.inf  # seconds and wall time
     return Simulation(robot, conditions, 0, record, count, error, None, *without_controller)

@@ -187,9 +187,8 @@ def _check_model(robot: Robot, controller: Controller) -> None:
         return
     has, wants = ((one.m, [len(carrier.actuators) for carrier in one.carriers]) for one in (model, robot))
     if has != wants:
-        raise InputError(
-            f"controller must be for robot {robot.name!r}, got {type(controller).__name__} for {model.name!r}"
-        )
+        kind = type(controller).__name__
+        raise InputError(f"controller must be for robot {robot.name!r}, got {kind} for {model.name!r}")
     if isinstance(inner, LengthControl):
         undamped = [i for i, cable in enumerate(robot.cables) if cable.stiffness and not cable.damping]
         if undamped and inner.corrects:

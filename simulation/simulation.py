@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -68,9 +69,8 @@ class Simulation(SimulationData, MotionResult, Reported):
         robot, record, rows = self.robot, self.record, slice(self._recorded)
         motions, references = record.motions[rows], self.references[: self._recorded]
         body, base, cable = ("time", "coordinate"), ("time", "carrier", "coordinate"), ("time", "cable")
-        accelerations = (
-            np.gradient(motions[..., 6:], self.period, axis=0) if self._recorded > 1 else 0 * motions[..., 6:]
-        )
+        moving = self._recorded > 1
+        accelerations = np.gradient(motions[..., 6:], self.period, axis=0) if moving else 0 * motions[..., 6:]
         parts = motions[..., :6], motions[..., 6:], accelerations
         variables = motion_variables((part[:, 0] for part in parts), (part[:, 1:] for part in parts))
         wanted = np.stack([reference.pose for reference in references])
@@ -217,21 +217,21 @@ def occurrences(flight: SimulationData) -> list[Occurrence]:
     for cable in np.flatnonzero(released.any(axis=0)):
         at = float(flight.times[released[:, cable].argmax()])
         found.append(Occurrence(at, "fault", f"cable {cable + 1} was released"))
-    if flight.slack.any():
-        row, cable = np.argwhere(flight.slack)[0]
-        found.append(Occurrence(float(flight.times[row]), "slack", f"cable {cable + 1} was the first to go slack"))
-    if (above := flight.above > 0).any():
-        row, cable = np.argwhere(above)[0]
-        found.append(
-            Occurrence(float(flight.times[row]), "tension", f"cable {cable + 1} was the first to exceed its t_max")
-        )
-    if (beyond := ~(flight.error <= flight.tolerance)).any():
-        within = quantity(1e3 * flight.tolerance, "mm")
-        found.append(Occurrence(float(flight.times[np.argmax(beyond)]), "error", f"the error exceeded {within}"))
-    if (room := room_of(flight.robot)) is not None and (beyond := flight.outside > LEAST).any():
-        row, side = np.argwhere(beyond)[0]
-        words = f"the platform went {room.names[side]} (by {quantity(flight.outside[:, side].max(), 'm')} at most)"
-        found.append(Occurrence(float(flight.times[row]), "room", words))
+    room, within = room_of(flight.robot), quantity(1e3 * flight.tolerance, "mm")
+    sides, most = room.names if room else (), flight.outside.max(axis=0)
+    firsts: dict[str, tuple[np.ndarray, Callable[[int], str]]] = {
+        "slack": (flight.slack, lambda i: f"cable {i + 1} was the first to go slack"),
+        "tension": (flight.above > 0, lambda i: f"cable {i + 1} was the first to exceed its t_max"),
+        "error": (~(flight.error <= flight.tolerance)[:, None], lambda _: f"the error exceeded {within}"),
+        "room": (
+            flight.outside > LEAST,
+            lambda i: f"the platform went {sides[i]} (by {quantity(most[i], 'm')} at most)",
+        ),
+    }
+    for kind, (where, words) in firsts.items():
+        if where.any():
+            row, column = np.argwhere(where)[0]
+            found.append(Occurrence(float(flight.times[row]), kind, words(column)))
     if flight.lasted < len(flight.references):
         found.append(Occurrence(flight.lasted * flight.period, "end", "the simulation diverged"))
     shown = [event for event in found if event.at <= max(flight.lasted, 1) * flight.period]

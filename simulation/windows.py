@@ -217,10 +217,7 @@ class Windows:
         lengths = np.asarray(dynamics.cable_lengths(self._platform[0], carriers))
         self._cable_speed = np.gradient(lengths, self._dt, axis=1)
         first = [part[:, 0] for part in (*self._platform, *self._carried)]
-        self._balance = (
-            np.asarray(dynamics.wrench_matrix(first[0], first[3])),
-            np.asarray(dynamics.required_wrench(*first)),
-        )
+        self._balance = dynamics.wrench_matrix(first[0], first[3]), dynamics.required_wrench(*first)
         self._pull = None
         if of.tensions is not None:
             even = smooth(of.times, of.tensions, widest_parabola(of.times, of.tensions))

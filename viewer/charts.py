@@ -33,9 +33,8 @@ class Charts:
         drawn = [(shown, "", {})]
         drawn += [] if other is None else [(other.on(shown.times), ", other", {"dash": OTHER, "width": 1.0})]
         cables = range(shown.tensions.shape[1])
-        tensions = [
-            (its.tensions[:, i], f"cable {i + 1}{word}", _stroke(i) | look) for its, word, look in drawn for i in cables
-        ]
+        several = [(its.tensions[:, i], i, word, look) for its, word, look in drawn for i in cables]
+        tensions = [(values, f"cable {i + 1}{word}", _stroke(i) | look) for values, i, word, look in several]
         margins = [(its.margins, f"margin{word}", _stroke(0) | look) for its, word, look in drawn]
         self._charts = [
             self._chart(gui, "tensions [N]", tensions, TALL, np.unique(limits)),

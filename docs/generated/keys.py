@@ -130,9 +130,8 @@ def _referred(field: Any) -> list[str]:
     if not isinstance(field, dict):
         return []
     found = [field["$ref"].rpartition("/")[2]] if "$ref" in field else []
-    return found + [
-        part for key, each in field.items() if key not in ("discriminator", "default") for part in _referred(each)
-    ]
+    inner = [each for key, each in field.items() if key not in ("discriminator", "default")]
+    return found + _referred(inner)
 
 
 def _bounds(field: Schema) -> str:

@@ -125,9 +125,8 @@ def _of_rows(rows: Sequence[list[str]], head: str) -> tuple[list[str], list[str]
     above_names = [list(accumulate(row, lambda before, cell: cell or before)) for row in above_names]
     bodies = [cell[:-2] if cell.endswith(" X") and after == "Y" else "" for cell, after in pairwise([*last, ""])]
     of = list(accumulate(bodies, lambda before, body: body or before))
-    last = [
-        cell if not body or cell.startswith(body) else f"{body} {cell}" for cell, body in zip(last, of, strict=True)
-    ]
+    pairs = zip(last, of, strict=True)
+    last = [cell if not body or cell.startswith(body) else f"{body} {cell}" for cell, body in pairs]
     names = ["/".join(dict.fromkeys(filter(None, column))) for column in zip(*above_names, last, strict=True)]
     if stated:
         return names, units
@@ -145,11 +144,9 @@ def _of_scope(rows: Sequence[list[str]]) -> tuple[list[str], list[str]]:
     """Return names and units of columns of TwinCAT Scope: rows such as Name and Unit, beside the times of channels."""
     known = {row[0]: row for row in rows}
     titles, words = known["Name"], known.get("Unit", [""] * len(rows[0]))
-    named = [
-        ("time", "ms") if name == "Name" else (name, word.partition(" ")[0])
-        for name, word in zip(titles, words, strict=True)
-    ]
-    return [name for name, _ in named], [unit if unit in KNOWN_UNITS else "" for _, unit in named]
+    units = ["ms" if title == "Name" else word.partition(" ")[0] for title, word in zip(titles, words, strict=True)]
+    names = ["time" if title == "Name" else title for title in titles]
+    return names, [unit if unit in KNOWN_UNITS else "" for unit in units]
 
 
 def sample_period(text: str) -> float | None:

@@ -178,9 +178,8 @@ def listed(recordings: Sequence[Recording], but: Sequence[Fields] | None = None)
     ]
     if len(names) < (1 if but is None else 2):  # a position has two coordinates or more
         return "none" if but is None else ""
-    return (
-        f"{', '.join(names[:MOST_LISTED])}{' ...' if len(names) > MOST_LISTED else ''}; a map (--fields) may name them"
-    )
+    more = " ..." if len(names) > MOST_LISTED else ""
+    return f"{', '.join(names[:MOST_LISTED])}{more}; a map (--fields) may name them"
 
 
 def _times(recordings: Sequence[Recording], given: LogMap | None) -> tuple[Field, ...]:

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -200,12 +201,9 @@ def _with_directions(read: Log, robot: Robot | None, given: LogMap | None) -> Lo
         recorded[name] = np.pad(part, ((0, 0), (0, 0), (0, 1)), constant_values=np.nan) if flat else part
     if read.ned is not None:  # directions in the same frame, or in those of the bodies
         frames = {"in north, east, down": FROM_NED[read.ned], "in forward, right, down": FROM_FRD}
-        whole = [
-            (f"{name} {frame}".strip(), part @ turn.T)
-            for name, part in recorded.items()
-            for frame, turn in frames.items()
-        ]
-        recorded |= {name: part for name, part in whole if np.isfinite(part).any()}
+        for (name, part), (frame, turn) in product(list(recorded.items()), frames.items()):
+            if np.isfinite(part @ turn.T).any():
+                recorded[f"{name} {frame}".strip()] = part @ turn.T
     world, note = next(iter(recorded.values())), None
     if robot is not None:
         world, note = in_world(robot, measured, recorded, None if given is None else given.directions_in)

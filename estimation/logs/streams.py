@@ -44,13 +44,10 @@ class Reader:
             parts.append(Samples(whole.times, column[:, None]))
         if all(one.topic is fields[0].topic for one in fields):
             return Samples(parts[0].times, np.hstack([part.values for part in parts]))
-        several = [
-            parts[0],
-            *(at_times(parts[0].times, part, one) for part, one in zip(parts[1:], fields[1:], strict=True)),
-        ]
-        whole = np.hstack([part.values for part in several])
+        times = parts[0].times
+        whole = np.hstack([at_times(times, *pair).values for pair in zip(parts, fields, strict=True)])
         kept = np.isfinite(whole).all(axis=1)
-        return Samples(None if parts[0].times is None else parts[0].times[kept], whole[kept])
+        return Samples(None if times is None else times[kept], whole[kept])
 
     def _topic(self, one: Field) -> Samples:
         key = id(one.topic)

@@ -59,9 +59,8 @@ def _with_whole_stamps(columns: dict[str, np.ndarray]) -> None:
     """Join stamps of whole seconds and the nanoseconds beyond them, as messages of ROS have them, in place."""
     for name in [name for name in columns if NANOSECONDS.search(name)]:
         stem = NANOSECONDS.sub("", name)
-        whole = next(
-            (one for one in columns if re.fullmatch(rf"{re.escape(stem)}(?:s|secs?|seconds)", one, re.I)), None
-        )
+        seconds = re.compile(rf"(?i){re.escape(stem)}(?:s|secs?|seconds)")
+        whole = next(filter(seconds.fullmatch, columns), None)
         if whole is not None:
             stamps = columns.pop(whole) + 1e-9 * columns.pop(name)
             columns[stem.rstrip("./_ ") or "stamp"] = stamps
@@ -84,10 +83,8 @@ def _at_one_time(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 def _with_frames(columns: dict[str, np.ndarray], period: float | None) -> list[str]:
     """Add times of frames, `period` [s] apart, to a table of several columns without times, in place; return a note."""
-    timed = any(
-        (found := role(name)) and found.role == "time" and np.isfinite(column).any() for name, column in columns.items()
-    )
-    if timed or period is None or len(columns) < 2:
+    known = [role(name) for name, column in columns.items() if np.isfinite(column).any()]
+    if any(found and found.role == "time" for found in known) or period is None or len(columns) < 2:
         return []
     count = np.arange(len(next(iter(columns.values()))), dtype=float)
     columns["time"] = period * next((column for name, column in columns.items() if name.lower() == "frame"), count)
@@ -113,9 +110,8 @@ def from_netcdf(content: bytes, where: str) -> Recording:
     except InputError:
         raise
     except Exception as error:  # h5py raises of any kind for damaged files
-        raise InputError(
-            f"must be a NetCDF 4 file, got one that cannot be read ({printable(str(error), 80)})"
-        ) from None
+        reason = printable(str(error), 80)
+        raise InputError(f"must be a NetCDF 4 file, got one that cannot be read ({reason})") from None
     stated = {name: known[f"sigma_{name}"] for name in Sigma._fields if f"sigma_{name}" in known}
     columns: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}

@@ -195,9 +195,8 @@ class PoseEstimate(Displayed):
         It is 0 for a cable without redundancy. The lengths are linearised, so a large error may mark another cable.
         """
         pose, residuals = self.pose.reshape(-1, 6), self.residuals.reshape(-1, self.robot.m)
-        return residual_tests(self.robot, pose, residuals, self.sigma, self._carriers())[1].reshape(
-            self.residuals.shape
-        )
+        statistics = residual_tests(self.robot, pose, residuals, self.sigma, self._carriers())[1]
+        return statistics.reshape(self.residuals.shape)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the estimate as plain numbers, for JSON."""

@@ -344,11 +344,8 @@ class PoseFilter(Displayed):
         force = mass * (acceleration[:3] - lever @ acceleration[3:] + about @ around - self._gravity)
         moment = inertia @ acceleration[3:] + about @ momentum + lever @ force
         H = self._rows(6)
-        H[:3, SPIN], H[:3, PUSH], H[:3, TWIRL] = (
-            -mass * (cross(around) + about @ lever),
-            mass * np.eye(3),
-            -mass * lever,
-        )
+        H[:3, SPIN] = -mass * (cross(around) + about @ lever)
+        H[:3, PUSH], H[:3, TWIRL] = mass * np.eye(3), -mass * lever
         H[3:] = lever @ H[:3]
         H[3:, SPIN] += about @ inertia - cross(momentum)
         H[3:, TWIRL] += inertia

@@ -108,7 +108,7 @@ def _columns(moving: list[str], has_wind: bool) -> list[tuple[int, int, str]]:
     groups += [(6, f"pose of carrier {name}") for name in moving]
     groups += [(3, "wind, in {G}")] if has_wind else []
     groups += [(6, "disturbance, in {G}: other force on the platform, and moment about its CoM")]
-    lasts = [sum(size for size, _ in groups[: index + 1]) for index in range(len(groups))]
+    lasts = accumulate(size for size, _ in groups)
     return [(last - size + 1, last, what) for last, (size, what) in zip(lasts, groups, strict=True)]
 
 
