@@ -15,9 +15,12 @@ import argparse
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ruamel.yaml import YAML
 
 from ..models import Robot, load
 from ..ocp import MotionStatus, Plan, plan
@@ -25,7 +28,8 @@ from . import harness
 
 Scene = tuple[Robot, dict[str, Any]]
 
-LENGTH = 0.5  # [m], of the quadrotors' cables
+DATA: dict[str, Any] = YAML(typ="safe", pure=True).load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
+LENGTH = DATA["cable"]["length"]  # [m], of the quadrotors' cables
 QUADROTOR, APART, LOAD = 0.1, 0.2, 0.01  # [m]
 FOUR_AT_GOAL = [(azimuth, 1.2) for azimuth in (0.0, 5.0, 3.14, 4.0)]
 TEAMS = {  # azimuth and elevation of each cable [rad]
@@ -82,34 +86,14 @@ def row(name: str, planned: Plan, seconds: float) -> str:
 
 def team(cables: list[tuple[float, float]]) -> Robot:
     """Return quadrotors with one cable each to a point load, at azimuths and elevations [rad] about it."""
-    quadrotors, lines = [], []
-    for i, offset in enumerate(_offsets(cables), start=1):
-        quadrotors.append(
-            {
-                "name": f"quad{i}",
-                "kind": "quadrotor",
-                "home": [*offset.tolist(), 0.0, 0.0, 0.0],
-                "mass": 0.034,
-                "inertia": [1.7e-5, 1.7e-5, 2.9e-5, 0, 0, 0],
-                "thrust_max": 0.6,
-                "torque_max": [0.01, 0.01, 0.003],
-                "tilt_max": 0.6,
-                "speed_max": 2.0,
-                "acceleration_max": 3.0,
-            }
-        )
-        ends = {"carrier": f"quad{i}", "anchor": [0, 0, 0], "attachment": [0, 0, 0]}
-        lines.append({**ends, "length": LENGTH, "t_min": 0.002, "t_max": 0.5})
-    return Robot.model_validate(
-        {
-            "name": f"point-load-{len(cables)}",
-            "source": "cables and ends: coltrans-planning; masses, thrusts and tensions are assumed",
-            "platform": {"mass": 0.01, "dof": ["x", "y", "z"], "home": [0, 0, 0, 0, 0, 0]},
-            "carriers": quadrotors,
-            "drive": "fixed-length",
-            "cables": lines,
-        }
-    )
+    names = [f"quad{i}" for i in range(1, len(cables) + 1)]
+    homes = [[*offset.tolist(), 0.0, 0.0, 0.0] for offset in _offsets(cables)]
+    parts = {
+        "name": f"point-load-{len(cables)}",
+        "carriers": [DATA["quadrotor"] | {"name": name, "home": at} for name, at in zip(names, homes, strict=True)],
+        "cables": [DATA["cable"] | {"carrier": name} for name in names],
+    }
+    return Robot.model_validate(DATA["team"] | parts)
 
 
 def _offsets(cables: list[tuple[float, float]]) -> np.ndarray:
@@ -179,79 +163,16 @@ def forest(count: int) -> Scene:
     return carried(count, [0, -1, 0], [0, 2, 0], [-0.76, -1.1, 0.0], [0.76, 2.1, 0.5], TREES, at_goal)
 
 
-def warehouse() -> Scene:
-    """Return a platform of 40 kg under eight crossed cables in a frame of 12 x 8 x 6 m, and a rack between its ends."""
-    like = load("cogiro")
-    size = np.array([12.0, 8.0]) / np.ptp(like.home_anchors[:, :2], axis=0)
-    cables = [
-        {
-            "carrier": "frame",
-            "anchor": [*(anchor[:2] * size).tolist(), float(anchor[2] * 6.0 / 5.42)],
-            "attachment": attachment.tolist(),
-            "t_min": 20,
-            "t_max": 3000,
-        }
-        for anchor, attachment in zip(like.anchors, like.attachments, strict=True)
-    ]
-    robot = Robot.model_validate(
-        {
-            "name": "warehouse",
-            "source": "cogiro, with another frame and a lighter platform",
-            "platform": {"mass": 40, "inertia": [12, 12, 10, 0, 0, 0], "com": [0, 0, 0.3], "home": [0, 0, 1, 0, 0, 0]},
-            "carriers": [{"name": "frame", "kind": "ground"}],
-            "cables": cables,
-        }
-    )
-    rack = {"kind": "box", "name": "rack", "min": [-0.5, -4, 0], "max": [0.5, 1, 1.5], "platform": 0.1, "cables": 0.05}
-    task = {
-        "path": {"kind": "line", "start": [-3, -1, 0.3], "end": [3, -1, 0.3]},
-        "duration": 12,
-        "tube": {"position": "free"},
-        "limits": {"keep_out": [rack]},
-    }
-    return robot, task
+def given(name: str) -> Scene:
+    """Return a scene whose robot and task are both in scenes.yaml."""
+    robot = DATA[name]["robot"]
+    return load(robot) if isinstance(robot, str) else Robot.model_validate(robot), DATA[name]["task"]
 
 
-def shelf() -> Scene:
-    """Return a load under three cables that is lifted past a shelf above it."""
-    place = {"kind": "box", "name": "shelf", "min": [-0.6, -0.2, 1.0], "max": [0.2, 0.2, 1.1]}
-    task = {
-        "path": {"kind": "line", "start": [0, 0, 0.3], "end": [0, 0, 1.8]},
-        "duration": 6,
-        "tube": {"position": "free"},
-        "limits": {"keep_out": [place | {"platform": 0.1, "cables": 0.02}]},
-    }
-    return load("point-mass-3"), task
-
-
-def hatch() -> Scene:
-    """Return a wall with a hole beside the straight way, through which three quadrotors carry their load."""
-    wall = {"kind": "box", "platform": 0.4, "carriers": 0.3, "cables": 0.05}
-    places = [
-        wall | {"name": "left", "min": [-0.1, 4.0, -3], "max": [0.1, 9, 6]},
-        wall | {"name": "right", "min": [-0.1, -9, -3], "max": [0.1, 1.0, 6]},
-        wall | {"name": "below", "min": [-0.1, 1.0, -3], "max": [0.1, 4.0, -0.5]},
-        wall | {"name": "above", "min": [-0.1, 1.0, 2.5], "max": [0.1, 4.0, 6]},
-    ]
-    task = {
-        "path": {"kind": "line", "start": [-3, 0, 0], "end": [3, 0, 0]},
-        "duration": 10,
-        "steps": 40,
-        "tube": {"position": "free", "attitude": "free"},
-        "base": {"kind": "free"},
-        "limits": {
-            "keep_out": places,
-            "carrier_separation": 0.6,
-            "platform_box": {"min": [-4, -4, -2], "max": [4, 4, 5]},
-        },
-    }
-    return load("multi-quadrotor-3"), task
-
-
-SCENES: dict[str, Callable[[], Scene]] = {"warehouse": warehouse, "shelf": shelf, "hatch": hatch}
+SCENES: dict[str, Callable[[], Scene]] = {name: partial(given, name) for name in ("warehouse", "shelf", "hatch")}
 for _kind in (empty, window, forest):
     for _count in range(1, 7):
-        SCENES[f"{_kind.__name__}_{_count}"] = lambda kind=_kind, count=_count: kind(count)
+        SCENES[f"{_kind.__name__}_{_count}"] = partial(_kind, _count)
 
 
 if __name__ == "__main__":

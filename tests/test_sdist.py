@@ -60,7 +60,7 @@ def test_the_wheel_is_the_packages_and_their_data(wheel, tracked):
     pages = {name for name in tracked if re.fullmatch(r"(figures|viewer)/[^/]*\.(html|js)", name)}
     pages |= {name for name in tracked if name.startswith("viewer/live/")}
     claims = {name for name in tracked if re.fullmatch(r"studies/\w+/claims\.yaml", name)}
-    new = {name for name in tracked if re.fullmatch(r"cli/templates/[^/]*\.yaml", name)}
+    new = {name for name in tracked if re.fullmatch(r"(cli/templates|benchmarks)/[^/]*\.yaml", name)}
     schema = {"py.typed", "ocp/tasks/task.schema.json"}
     data = {f"towline/{name}" for name in robots | step | pages | claims | new | schema}
     core = re.compile(r"towline/core/((\w+/)?\w+\.[ch]|_core\.pyi|_core(\.abi3\.so|\.pyd))")
