@@ -3,7 +3,11 @@
 from ..base.execution import Execution
 from ..control.noise import Noise
 from .conditions import Conditions
-from .events import Carry, Cut, Event, Follow, Lose, Miss, Push, Stick, StopReference, Wall
+from .events.event import Event
+from .events.faults import Cut, Lose, Miss, Stick
+from .events.loads import Carry
+from .events.pushes import Push, Wall
+from .events.references import Follow, StopReference
 from .log_replay import Replay, replay
 from .mismatch import Mismatch
 from .own_run import simulation_of

@@ -8,7 +8,8 @@ import numpy as np
 from ..base.display import record
 from ..control import Reference
 from ..control.noise import Noise
-from .events import Cut, Event
+from .events.event import Event
+from .events.faults import Cut
 from .mismatch import Mismatch
 
 Wind = Callable[[np.ndarray, int], np.ndarray]  # the wind at times (K,) [s] for a seed, (K, 3) [m/s]

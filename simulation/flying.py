@@ -17,7 +17,7 @@ from ..models.trajectory import moved_on
 from ..plant import Plant
 from ..plant.periods import Periods
 from .command_conversion import Orders
-from .events import Event, Running
+from .events.event import Event, Running
 from .experiment import Experiment
 from .record import Period
 from .sensors import Reading, Sensors

@@ -14,7 +14,7 @@ from ..control.trajectory import read_trajectory
 from ..plant import Plant
 from ..plant.plant import History
 from ..plant.reading import sensed
-from .events import Cut
+from .events.faults import Cut
 from .experiment import Experiment
 from .record import Record
 from .simulation import Simulation

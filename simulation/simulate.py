@@ -31,7 +31,10 @@ from ..plant import Plant
 from ..plant.steps import default_drive, steps_in, windings_in
 from .command_conversion import Orders
 from .conditions import Conditions
-from .events import Carry, Event, Stick, read_events
+from .events.event import Event
+from .events.faults import Stick
+from .events.loads import Carry
+from .events.read import read_events
 from .experiment import Experiment
 from .flights import copies, flights, plant_of, summary
 from .flying import fly

@@ -14,7 +14,7 @@ from towline.control import ComputedTorque, OpenLoop, Predictive, references
 from towline.control.trajectory import read_trajectory
 from towline.models import Dynamics
 from towline.simulation import Cut, Event, Follow, Push, Wall
-from towline.simulation.events import read_events
+from towline.simulation.events.read import read_events
 
 PAGE = (Path(__file__).parent.parent / "docs" / "adding-an-event.md").read_text()
 (CODE,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)

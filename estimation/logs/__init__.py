@@ -1,21 +1,8 @@
 """Logs: recordings of robots in any usual kind of file, and the measurements in them."""
 
-from .mapping import LogMap, fields_of, read_map
-from .measurements import Measurements, Sigma
+from .mapping import read_map
+from .measurements import Sigma
 from .opening import recordings
-from .reading import Log, read_log, read_measurements
-from .recording import Recording, Topic
+from .reading import read_log, read_measurements
 
-__all__ = [
-    "Log",
-    "LogMap",
-    "Measurements",
-    "Recording",
-    "Sigma",
-    "Topic",
-    "fields_of",
-    "read_log",
-    "read_map",
-    "read_measurements",
-    "recordings",
-]
+__all__ = ["Sigma", "read_log", "read_map", "read_measurements", "recordings"]
