@@ -5,10 +5,7 @@ cos a_i and sin a_i, a_i = 60 degrees (i - 1): their only products of second ord
 cos^2 a_i + sin^2 a_i, a constant. Six points of three functions, 1, cos a_i and sin a_i, span three dimensions at most.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,9 +15,6 @@ from ...models import load
 from ...models.diagnosis import diagnose
 from ..accounts.claim import Chapter, Verdict
 from .claims import claim
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 ROWS = 6  # of J, whose inverse step 7 of section V takes
 LEVEL = 200  # positions and yaws at which the coordinates are formed
@@ -62,7 +56,7 @@ def off_affine() -> float:
     return float(np.abs(rest @ lines).max() / np.abs(lines).max())
 
 
-def from_above(pairings: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Figure:
+def from_above(pairings: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> "style.Figure":
     """Draw (anchors, attachments), (m, 3) each [m], of several pairings side by side, under their titles."""
     canvas = style.figure(height=0.9 + 3.0 / len(pairings))
     for place, (title, (anchors, attachments)) in enumerate(pairings.items(), 1):
