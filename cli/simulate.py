@@ -203,7 +203,6 @@ def _often(run: Callable[..., xr.Dataset], plan: str, where: Execution, target: 
     """Simulate with many seeds, save, draw and print; return whether all runs passed."""
     from ..figures import flight as figure
     from ..figures import style
-    from ..figures.envelopes import envelopes
     from ..simulation.flights import report, save, summary
 
     with counting(f"simulating {plan}", "passed", quiet=outputs.as_json) as show:
@@ -212,7 +211,7 @@ def _often(run: Callable[..., xr.Dataset], plan: str, where: Execution, target: 
     file = save(flights, target)
     pictures = []
     if outputs.figures is not None:
-        drawings = {"errors": figure.errors(flights), "envelopes": envelopes(flights)}
+        drawings = {"errors": figure.errors(flights), "envelopes": figure.envelopes(flights)}
         pictures = style.save_all(lambda: drawings, outputs.figures, outputs.form)
     data = {**summary(flights), "file": file, "figures": pictures}
     print_result(outputs.as_json, data, lambda: report(flights).text(), (file, *pictures))

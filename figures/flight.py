@@ -1,4 +1,4 @@
-"""Draw a simulation over time: error, wind, carriers, tensions, controller status; and the errors of many runs."""
+"""Draw a simulation over time: error, wind, carriers, tensions, controller status; and errors of many runs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 OFFSET = 1e-6  # [m]; carriers that stay so near to their reference have no panel
-GREY = "#d4d4d4"
+GREY, DARK = "#d4d4d4", "#444444"
 DIFFERENCE = 0.01  # of all tensions' range: commands nearer to the real tensions are not drawn over them
 DECADES = 30.0  # largest error over the smallest of flights from which on the axis is logarithmic
 SCALES = ((1.0, 1.0, "m"), (1e-4, 1e-3, "mm"), (0.0, 1e-6, "µm"))  # from which lengths units are used, and their size
@@ -67,9 +67,9 @@ def tensions(trajectory: xr.Dataset) -> style.Figure:
         ax.plot(time, np.where(gone[:, index], np.nan, real[:, index]), **style.look(index))
         commands = np.where(differs[:, index], commanded[:, index], np.nan)
         ax.plot(time, commands, color=style.colour(index), linewidth=0.6)
-    ax.plot([], [], color="#444444", linewidth=1.5, label="real" if differs.any() else "real, and as commanded")
+    ax.plot([], [], color=DARK, linewidth=1.5, label="real" if differs.any() else "real, and as commanded")
     if differs.any():
-        ax.plot([], [], color="#444444", linewidth=0.6, label="commanded, where it differs")
+        ax.plot([], [], color=DARK, linewidth=0.6, label="commanded, where it differs")
     slack = (real <= 0) & (trajectory["t_min"].values > 0) & ~gone
     if slack.any():
         for start, stop in _spans(time, np.asarray(slack.any(axis=1))):
@@ -104,6 +104,40 @@ def errors(flights: xr.Dataset) -> style.Figure:
     draw_tolerance(ax, tolerance, largest[-1], scale)
     ax.set_xlim(0, 100)
     return style.legend_below(canvas, ax)
+
+
+def envelopes(flights: xr.Dataset) -> style.Figure:
+    """Draw median, range of 5 to 95 % and extreme of the runs: errors above, smallest and largest tensions below."""
+    canvas = style.figure(height=3.4)
+    errors, tensions = style.panels_below(canvas, "time [s]", ["", "tension [N]"], [1.7, 1.7])
+    error = flights["error_quantiles"].values
+    largest = float(np.nanmax(error))
+    scale, unit = scale_of(largest)
+    errors.set_ylabel(f"error [{unit}]")
+    _draw_band(errors, flights, error / scale, 0, -1)
+    errors.set_ylim(bottom=0.0)
+    names = {"largest": ("tension_max_quantiles", -1), "smallest": ("tension_min_quantiles", 0)}
+    for index, (variable, extreme) in enumerate(names.values()):
+        _draw_band(tensions, flights, flights[variable].values, 1 + index, extreme)
+    medians = [flights[variable].sel(quantile=0.5).dropna("time").values for variable, _ in names.values()]
+    ends = [float(median[-1]) if median.size else 0.0 for median in medians]
+    name_at_the_end(tensions, np.array(ends), list(names), cables=False)
+    for ax in (errors, tensions):
+        ax.set_xlim(0.0, float(flights.attrs["duration_s"]))
+    errors.plot([], [], color=DARK, linewidth=1.5, label="median of the runs")
+    errors.fill_between([], [], color=DARK, alpha=0.25, linewidth=0, label="5 to 95 %")
+    errors.plot([], [], color=DARK, linewidth=0.6, label="extreme of all")
+    draw_tolerance(errors, float(flights.attrs["tolerance_m"]), largest, scale)
+    return style.legend_below(canvas, errors)
+
+
+def _draw_band(ax: style.Axes, flights: xr.Dataset, values: np.ndarray, index: int, extreme: int) -> None:
+    """Draw quantiles (q, n) of a value over time in one colour, and one of them as its extreme."""
+    time, quantiles, colour = flights["time"].values, flights["quantile"].values, style.colour(index)
+    low, median, high = (values[int(np.abs(quantiles - share).argmin())] for share in (0.05, 0.5, 0.95))
+    ax.fill_between(time, low, high, color=colour, alpha=0.25, linewidth=0)
+    ax.plot(time, median, color=colour)
+    ax.plot(time, values[extreme], color=colour, linewidth=0.6)
 
 
 def _mark_events(panels: list[style.Axes], trajectory: xr.Dataset) -> None:
@@ -152,7 +186,7 @@ def _draw_answers(ax: style.Axes, trajectory: xr.Dataset) -> None:
     answers = _answers(trajectory)
     for row, flag in enumerate(answers.values()):
         spans = [(start, stop - start) for start, stop in _spans(time, answered == flag)]
-        ax.broken_barh(spans, (row - 0.35, 0.7), facecolor="#444444", edgecolor="#444444", linewidth=0.8)
+        ax.broken_barh(spans, (row - 0.35, 0.7), facecolor=DARK, edgecolor=DARK, linewidth=0.8)
     ax.set_yticks(range(len(answers)), list(answers))
     ax.set_ylim(len(answers) - 0.5, -0.5)
     ax.grid(False)

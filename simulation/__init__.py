@@ -5,8 +5,7 @@ from ..control.noise import Noise
 from .conditions import Conditions
 from .events.event import Event
 from .events.faults import Cut, Lose, Miss, Stick
-from .events.loads import Carry
-from .events.pushes import Push, Wall
+from .events.loads import Carry, Push, Wall
 from .events.references import Follow, StopReference
 from .log_replay import Replay, replay
 from .mismatch import Mismatch

@@ -12,7 +12,6 @@ from towline import load
 from towline.figures import calibration, flight, limits, phase_plane, plan, robot, sweep, workspace
 from towline.figures.convergence import convergence
 from towline.figures.curves import Panel, curve_in_space, curves
-from towline.figures.envelopes import envelopes
 from towline.figures.metric_map import metric_map
 from towline.figures.scene import Scene
 from towline.figures.views import views
@@ -264,7 +263,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "flight-tensions": lambda: flight.tensions(flown()),
     "flight-tensions-8": lambda: flight.tensions(flown(cables=8, wind=False)),
     "errors": lambda: flight.errors(flights()),
-    "envelopes": lambda: envelopes(enveloped()),
+    "envelopes": lambda: flight.envelopes(enveloped()),
     "residuals": lambda: residuals(8, np.arange(400) / 100),
     "residuals-3": lambda: residuals(3),
     "anchors-3": lambda: corrected(3),

@@ -1,15 +1,20 @@
-"""Loads on the platform: `Carry`, a load that is picked up, exchanged or released."""
+"""Loads on the platform: `Carry`, what it picks up or releases; `Push`, a force for some time; and a `Wall`."""
 
-from typing import Any, ClassVar, Literal
+from abc import ABC
+from math import inf
+from typing import Any, ClassVar, Literal, Self
 
+import numpy as np
+from pydantic import Field, PrivateAttr, model_validator
 from typing_extensions import override
 
 from ...base.errors import InputError
 from ...base.inputs import shown
 from ...base.text import quantity
+from ...models.part import NonNegative, Positive, Vector3, optional
 from ...models.rigid_load import RigidLoad
 from ...models.robot import Robot
-from .event import Event, Running, number_in
+from .event import Event, Running, Seconds, number_in
 
 
 class Carry(RigidLoad, Event):
@@ -46,3 +51,102 @@ class Carry(RigidLoad, Event):
     def begin(self, running: Running) -> None:
         """Give the platform the mass, CoM and inertia of platform and load; the state of a plant describes the CoM."""
         running.carry(self.on(running.plant.robot))
+
+
+class Lasting(Event, ABC):
+    """An event that acts for some time."""
+
+    duration: Seconds | None = optional("how long it acts [s]; default: until the end")
+
+    @property
+    @override
+    def until(self) -> float:
+        """Return the time at which it ends [s]; infinity if it does not."""
+        return inf if self.duration is None else self.at + self.duration
+
+
+class Push(Lasting):
+    """A force and a moment on the platform, or on a carrier that flies, from one time to another."""
+
+    kind: Literal["push"] = "push"
+    short: ClassVar[str] = "push [CARRIER] FX FY FZ [MX MY MZ]"
+    carrier: str | None = optional("name of the carrier on which it acts; default: the platform")
+    force: Vector3 = optional("force in {G} [N]", (0.0, 0.0, 0.0))
+    moment: Vector3 = optional("moment about the CoM in {G} [N m]", (0.0, 0.0, 0.0))
+    _body: int = PrivateAttr(default=0)  # on which it acts
+
+    @override
+    @classmethod
+    def in_words(cls, words: list[str]) -> dict[str, Any]:
+        """Return the carrier, if the first word is not a number, and force and moment from the numbers."""
+        numbers = [number_in(word) for word in words]
+        which = {"carrier": numbers.pop(0)} if numbers and isinstance(numbers[0], str) else {}
+        return {**which, "force": numbers[:3]} | ({"moment": numbers[3:]} if len(numbers) > 3 else {})
+
+    @override
+    def check(self, robot: Robot) -> None:
+        flying = [carrier.name for carrier in robot.carriers if carrier.body is not None]
+        if self.carrier is not None and self.carrier not in flying:
+            names = ", ".join(flying) or "it has none"
+            raise InputError(f"must name a carrier of {robot.name!r} that flies ({names}), got {shown(self.carrier)}")
+
+    @override
+    def begin(self, running: Running) -> None:
+        """Find the carrier among those of the robot."""
+        names = [carrier.name for carrier in running.plant.robot.carriers]
+        self._body = 0 if self.carrier is None else 1 + names.index(self.carrier)
+
+    @override
+    def describe(self, robot: Robot) -> str:
+        sizes = quantity(float(np.linalg.norm(self.force)), "N"), quantity(float(np.linalg.norm(self.moment)), "N m")
+        parts = [size for size, part in zip(sizes, (self.force, self.moment), strict=True) if any(part)]
+        lasting = "" if self.duration is None else f" for {quantity(self.duration, 's')}"
+        place = "" if self.carrier is None else f" on {self.carrier}"
+        return f"a push of {' and '.join(parts) or '0 N'}{place}{lasting}"
+
+    @override
+    def wrench(self, time: float, motions: np.ndarray) -> np.ndarray:
+        """Return force [N] and moment [N m], the same at each time [s]: (6,), or (1, 1 + c, 6) on a carrier."""
+        push = np.array([*self.force, *self.moment])
+        if self.carrier is None:
+            return push
+        result = np.zeros((1, motions.shape[1], 6))
+        result[:, self._body] = push
+        return result
+
+
+class Wall(Lasting):
+    """A plane that pushes the platform away, with a spring and a damper and without friction.
+
+    It touches the ball of the given radius about the origin of the platform frame. The force acts along the normal and
+    through the CoM; it never pulls. It is computed once in each period of the controller, which limits the stiffness
+    for which a contact is stable: sqrt(stiffness / mass) times the period should be at most 0.3.
+    """
+
+    kind: Literal["wall"] = "wall"
+    point: Vector3 = Field(description="a point of the plane in {G} [m]")
+    normal: Vector3 = Field(description="direction in {G} towards the robot, of any length")
+    stiffness: Positive = Field(description="force per depth [N/m]")
+    damping: NonNegative = optional("force per speed into the wall [N s/m]", 0.0)
+    radius: NonNegative = optional("radius of the ball that touches the wall [m]", 0.0)
+
+    @model_validator(mode="after")
+    def _has_normal(self) -> Self:
+        if not any(self.normal):
+            raise ValueError("normal must have a length, got zeros")
+        return self
+
+    @override
+    def describe(self, robot: Robot) -> str:
+        return f"a wall of {quantity(self.stiffness, 'N/m')} appeared"
+
+    @override
+    def wrench(self, time: float, motions: np.ndarray) -> np.ndarray:
+        """Return the force [N] on the platforms of N runs, with no moment, (N, 6), the same at each time [s]."""
+        normal = np.array(self.normal) / np.linalg.norm(self.normal)
+        position, velocity = motions[:, 0, :3], motions[:, 0, 6:9]
+        depth = self.radius - (position - np.array(self.point)) @ normal
+        force = np.where(depth > 0, self.stiffness * depth - self.damping * (velocity @ normal), 0.0)
+        result = np.zeros((len(motions), 6))
+        result[:, :3] = np.maximum(force, 0.0)[:, None] * normal
+        return result
