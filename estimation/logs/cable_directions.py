@@ -115,10 +115,8 @@ def placed(robot: Robot, measured: Measurements, poses: np.ndarray, seen: np.nda
     if seen is None:
         return poses
     carriers = np.broadcast_to(carriers_of(robot, measured), (len(seen), *robot.carrier_home.shape))
-    of = carriers[:, robot.carrier_of_cable]
-    anchors = of[..., :3] + (points.rotations(of[..., 3:]) @ robot.anchors[..., None])[..., 0]
-    arms = np.einsum("nij,mj->nmi", points.rotations(poses[:, 3:]), robot.attachments)
-    position = (anchors + lengths_of(robot, measured.lengths)[..., None] * seen - arms).mean(axis=1)
+    along = lengths_of(robot, measured.lengths)[..., None] * seen - points.attachments(robot, poses)
+    position = poses[:, :3] + (points.anchors(robot, carriers) + along).mean(axis=1)
     moves = (robot.dof_mask[:3] > 0) & np.isfinite(position)
     return np.hstack([np.where(moves, position, poses[:, :3]), poses[:, 3:]])
 
