@@ -10,6 +10,7 @@ predictive control had in such a run, alternating every few programs; and how fa
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -344,36 +345,13 @@ def markdown(report: Report) -> str:
     for row in report.errors:
         cells = [f"{row.rms_mm:.3g}", f"{row.max_mm:.3g}", f"{row.ratio:.2g}"]
         errors.append((row.task, row.controller, *cells, f"{100 * row.soft:.1f} %", f"{100 * row.slack:.1f} %"))
-    steps_table = "\n".join(table("task | controller | median us | p99 us | ratio", steps, 2))
     columns = "task | solver | required | median us | p99 us | ratio | to Horizon | error | residual | failures"
-    programs_table = "\n".join(table(columns, programs, 3))
-    columns = "task | controller | rms mm | largest mm | ratio | not as planned | slack"
-    errors_table = "\n".join(table(columns, errors, 2))
-    return f"""# Control
-
-Measured on {report.machine}.
-Runs of {report.count} steps of 1 ms in gusts, with elastic cables.
-
-## Whole steps, from state to command
-
-The ratio is relative to {STANDARD}.
-
-{steps_table}
-
-## Quadratic programs of predictive control
-
-The ratios are relative to `{REFERENCE}` and to `{TOWLINE}`, as medians over blocks of {BLOCK} programs, which the \
-solvers solve in turn. "required" gives the tolerance of each solver, and "its own" that it applies its own criterion; \
-speed_abs is a mode of HPIPM. The error is that of the first stage's controls, divided by their range. The residual is \
-that of the optimality conditions of all stages, in the same units. A failure is a missing result, or an error of more \
-than {FAILED:g}.
-
-{programs_table}
-
-## Errors of the position
-
-Number of runs: {report.seeds}, with the same gusts for all controllers. The ratio is that of a run's largest error to \
-the error with {STANDARD}, as the median over the runs.
-
-{errors_table}
-"""
+    tables = {
+        "steps": table("task | controller | median us | p99 us | ratio", steps, 2),
+        "programs": table(columns, programs, 3),
+        "errors": table("task | controller | rms mm | largest mm | ratio | not as planned | slack", errors, 2),
+    }
+    given = {"machine": report.machine, "count": report.count, "seeds": report.seeds, "failed": FAILED, "block": BLOCK}
+    given |= {"standard": STANDARD, "reference": REFERENCE, "towline": TOWLINE}
+    text = Path(__file__).with_name("control_report.md").read_text(encoding="utf-8")
+    return text.format(**given, **{name: "\n".join(lines) for name, lines in tables.items()})

@@ -217,20 +217,9 @@ def write(report: Report, folder: Path) -> list[Path]:
 
 def markdown(report: Report) -> str:
     """Return the report as a page: one table for each task, the fastest first."""
-    lines = [
-        "# All tables of tension distribution",
-        "",
-        f"Measured on {report.machine}.",
-        f"Random problems per task: {report.count}. Rounds after a warm-up round: {report.repeats}.",
-        'The column "required" gives the tolerance of each solver. '
-        'A solver is marked "out" if it exceeds the time limit.',
-        f"The ratio is the time of a solver divided by that of `{REFERENCE}` in the same round. The error is the "
-        "largest error of a tension, divided by the largest tension, or a dash if there is nothing to compare.",
-        "On the soft problems, the contender with `rho` uses this option of `solve_batch`, the weight of the wrench "
-        "error; all others solve problems with additional variables. "
-        '"core alone" calls the C code of the active-set method directly, without `solve`.',
-        f"A failure is a missing result, an error above {FAILED:g}, or a result for an infeasible problem.",
-    ]
+    text = Path(__file__).with_name("tension_report.md").read_text(encoding="utf-8").rstrip()
+    given = {"machine": report.machine, "count": report.count, "repeats": report.repeats}
+    lines = [text.format(**given, reference=REFERENCE, failed=FAILED)]
     for task in dict.fromkeys(row.task for row in report.rows):
         rows = []
         for row in sorted([r for r in report.rows if r.task == task], key=lambda row: (np.isnan(row.ratio), row.ratio)):

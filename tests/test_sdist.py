@@ -57,10 +57,10 @@ def test_the_wheel_is_the_packages_and_their_data(wheel, tracked):
     robots = {name for name in tracked if re.fullmatch(r"models/library/[^/]*\.(yaml|json)", name)}
     assert len(robots) > 20
     step = {name for name in tracked if name.startswith(("export/step/template/", "export/fmu/sources/"))}
-    pages = {name for name in tracked if re.fullmatch(r"(figures|viewer)/[^/]*\.(html|js)", name)}
+    pages = {name for name in tracked if re.fullmatch(r"(figures|viewer)/[^/]*\.(css|html|js)", name)}
     pages |= {name for name in tracked if name.startswith("viewer/live/")}
     claims = {name for name in tracked if re.fullmatch(r"studies/\w+/claims\.yaml", name)}
-    new = {name for name in tracked if re.fullmatch(r"(cli/templates|benchmarks)/[^/]*\.yaml", name)}
+    new = {name for name in tracked if re.fullmatch(r"(cli/templates/[^/]*\.yaml|benchmarks/[^/]*\.(md|yaml))", name)}
     schema = {"py.typed", "ocp/tasks/task.schema.json"}
     data = {f"towline/{name}" for name in robots | step | pages | claims | new | schema}
     core = re.compile(r"towline/core/((\w+/)?\w+\.[ch]|_core\.pyi|_core(\.abi3\.so|\.pyd))")

@@ -6,6 +6,8 @@ import math
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
+from string import Template
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +27,7 @@ TICK = 0.01  # [s] of the time line
 ORANGE = style.colour(1)
 NARROWEST = 0.004  # of the bar: a span that is seen
 PANEL = 20.5  # [rem], the width of viser's panel, with a margin
+STYLE = Template(Path(__file__).with_name("timeline.css").read_text(encoding="utf-8"))
 SPEEDS = ("0.25x", "0.5x", "1x", "2x", "4x")
 
 
@@ -137,15 +140,5 @@ def _style(spans: list[tuple[float, float]]) -> str:
     for first, last in spans:
         low, high = 100 * min(first, 1 - NARROWEST), 100 * max(last, first + NARROWEST)
         stops.append(f"transparent {low:.2f}%,{ORANGE} {low:.2f}%,{ORANGE} {high:.2f}%,transparent {high:.2f}%")
-    slider, play = (f"div:has(>.towline-timeline)+div{'+div' * k}" for k in range(2))
-    place = "position:fixed;bottom:0;z-index:3;background:#fffffff0;box-sizing:border-box;height:3.4em;padding:.6em"
-    return (
-        '<span class="towline-timeline"></span><style>'
-        f"{slider} .mantine-Slider-track::before{{background-image:linear-gradient(90deg,{','.join(stops)})}}"
-        f"{slider} .mantine-Slider-markLabel{{display:none}}"
-        f"@media (min-width:36.01em){{{slider}{{{place};left:6.5em;right:{PANEL}rem;padding-left:2.5em}}"
-        f"{play}{{{place};left:0;width:6.5em;margin:0!important}}"
-        f"{slider} .mantine-Slider-markLabel{{display:block;white-space:nowrap}}"
-        f"{slider} p{{display:none}}{slider} .mantine-Flex-root>div:has(>p){{width:0!important;padding:0!important}}}}"
-        "</style>"
-    )
+    style_of = STYLE.substitute(stops=",".join(stops), panel=PANEL)
+    return f'<span class="towline-timeline"></span><style>{style_of}</style>'
