@@ -134,7 +134,10 @@ class Measurements(Displayed):
             raise InputError(f"rows must be {accepted}, got {shown(rows)}") from None
 
     def changed(self, **new: Any) -> Measurements:
-        """Return the measurements with other arguments, by their names as for the class; None: not measured.
+        """Return the measurements with other arguments.
+
+        Args:
+            **new: Arguments by their names, as for the class, such as `lengths` (N, m) [m].
 
         Raises:
             InputError: If one has a wrong name, shape or value.
