@@ -99,22 +99,21 @@ class LengthControl(Controller):
         if not (self.stiffness > 0).all():
             raise InputError(f"stiffness must be positive, one or one for each cable, got {shown(stiffness)}")
         unknown = np.where(np.isfinite(self.stiffness), DAMPED * self.stiffness, 0.0)
-        known = [cable.damping or 0.0 if cable.stiffness else None for cable in self.robot.cables]
-        own = [usual if its is None else its for its, usual in zip(known, unknown, strict=True)]
+        each = zip(self.robot.cables, unknown.tolist(), strict=True)
+        own = [(cable.damping or 0.0) if cable.stiffness else usual for cable, usual in each]
         self._damping = repeated("damping", own if damping is None else damping, self.robot.m)
         if not (self._damping >= 0).all():
             raise InputError(f"damping must be at least 0, one or one for each cable, got {shown(damping)}")
         lengths = np.linalg.norm(self.robot.home_anchors - self.robot.home_attachments, axis=1)
         usual = max(SHARE * self.robot.length, STRAIN * float(lengths.max()))
         self._lag = number("lag", lag, 0.0, 1.0)
-        self._proportional = None if proportional is None else number("proportional", proportional, 0.0, 100.0)
-        self._integral = None if integral is None else number("integral", integral, 0.0, 1e3)
+        gains = ("proportional", proportional, 100.0), ("integral", integral, 1e3)
+        self._given = [None if gain is None else number(name, gain, 0.0, most) for name, gain, most in gains]
         noise = None if sensors is None else noise_of(sensors)
         self._age = 0.0 if noise is None else age_of(noise)
         self._gains = LengthGains(self.robot, self.stiffness, self._damping, self._lag, noise)
-        given = [self._proportional, self._integral]
-        self.corrects = any(given) or (None in given and any(self._gains_for(PERIOD, self._age)))
-        if None in given and not self.corrects:
+        self.corrects = any(self._gains_for(PERIOD, self._age))
+        if None in self._given and not self.corrects:
             least = quantity(float(self._damping.min()), "N s/m")
             warn(
                 f"lengths of {self.robot.name!r} are not corrected by the measured pose, because oscillations on "
@@ -239,13 +238,10 @@ class LengthControl(Controller):
         status = np.where(beyond | ~known, HOLD, status).astype(np.int8)
         return np.clip(np.nan_to_num(wanted), -self._most, self._most), status
 
-    def _gains_for(self, dt: float, age: float) -> tuple[float, float]:
+    def _gains_for(self, dt: float, age: float) -> list[float]:
         """Return P and I [1/s], given or by default, for a pose of an age [s] and steps of `dt` [s]."""
-        usual = self._gains.at(dt, age)
-        return (
-            usual[0] if self._proportional is None else self._proportional,
-            usual[1] if self._integral is None else self._integral,
-        )
+        usual = self._gains.at(dt, age) if None in self._given else (0.0, 0.0)
+        return [other if own is None else own for own, other in zip(self._given, usual, strict=True)]
 
 
 def _lead(lag: float, period: float) -> float:
