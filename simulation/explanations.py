@@ -15,6 +15,7 @@ RANGES = {
     "mass": (0.2, 5.0, 0.01),
     "stiffness": (0.1, 10.0, 0.02),
     "tilt": (-0.5, 0.5, 2e-3),
+    "com": (-1.0, 1.0, 2e-3),
     "load_cells": (-0.9, 10.0, 0.01),
     "cable_friction": (-1e5, 1e5, 0.1),
 }
@@ -25,7 +26,7 @@ REMOVED = 0.01  # of the sum of squares, from which on a parameter is named
 NOTHING = 0.5  # of the sum of squares that noise has: less needs no explanation
 DOUBT = 5e-4  # probability, on each side, that a parameter is named which only the scatter of the windows changes
 TIED = 0.1  # of what the best explains: others that explain as much, up to this, are not distinguished from it
-SHOWN = 0.1  # of a parameter (of 0.1 s, of a tenth of the tensions): its deviation where a recording does not show it
+SHOWN = 0.1  # of a parameter (of 0.1 s, 0.3 m, a tenth of the tensions): its deviation if a recording does not show it
 BLURRED = 0.2  # of the squares of the derivative by the stiffness: what may be noise of lengths
 FARTHEST = 5.0  # standard deviations of a start
 OUTLYING = 25.0  # times the usual sum of squares of a window
@@ -174,7 +175,8 @@ class Matching:
             match, sigma = self.fitted(first, name, used)
             before, value = (np.atleast_1d(getattr(one.parameters, name)) for one in (first, match))
             removed = whole - match.cost[used].sum()
-            size = {"delay": 0.1, "friction": max(10 * value[0], 0.1 * usual), "cable_friction": usual}.get(name, 1.0)
+            sizes = {"delay": 0.1, "com": 0.3, "cable_friction": usual, "friction": max(10 * value[0], 0.1 * usual)}
+            size = sizes.get(name, 1.0)
             certainly = np.abs(value - before) > certain * sigma
             low, high, _ = RANGES[name]
             inside = bool(((low < value + (name == "friction")) & (value < high)).all())
@@ -196,7 +198,8 @@ def applicable(windows: Windows) -> Sequence[str]:
     recorded = windows.recorded
     felt = windows.drive != "lengths" or (recorded.tensions is not None and recorded.robot.fixed_lengths is None)
     names = {"delay": windows.commanded, "friction": felt, "mass": True, "stiffness": windows.drive != "tensions"}
-    names |= {"tilt": True, "load_cells": recorded.tensions is not None, "cable_friction": felt}
+    names |= {"tilt": True, "com": bool(recorded.robot.dof_mask[3:].any()), "load_cells": recorded.tensions is not None}
+    names["cable_friction"] = felt
     return [name for name, depends in names.items() if depends]
 
 

@@ -17,7 +17,7 @@ from ..base.display import Displayed, Fact
 from ..base.errors import InputError
 from ..base.inputs import check_ending, file_path, flag, number, one_of
 from ..base.netcdf import Contents, Variable, save_netcdf
-from ..base.text import counted, quantity
+from ..base.text import counted, quantity, quantity_row
 from ..control.deviation import tolerance_of
 from ..estimation.logs.reading import Paths
 from ..estimation.logs.recorded import read_recorded
@@ -360,6 +360,8 @@ def _of(kind: str, value: float) -> str:
 def _value(name: str, value: Any) -> str:
     if name == "tilt":
         return quantity(float(np.degrees(np.linalg.norm(value))), "deg", 3)
+    if name == "com":
+        return f"({quantity_row(np.multiply(value, 1e3), digits=3)}) mm from the file's"
     if name == "cable_friction":
         largest = int(np.argmax(np.abs(value)))
         return f"up to {quantity(value[largest], 'N', 3)}, of cables[{largest}]"
@@ -374,7 +376,7 @@ def _value(name: str, value: Any) -> str:
 
 
 def _words(name: str) -> str:
-    return name.replace("_", " ")
+    return "CoM" if name == "com" else name.replace("_", " ")
 
 
 def _share(one: Explanation) -> str:

@@ -20,6 +20,7 @@ class Parameters(NamedTuple):
     mass: float = 1.0
     stiffness: float = 1.0
     tilt: tuple[float, ...] = (0.0, 0.0)  # rotation of gravity about x and y of {G} [rad]
+    com: tuple[float, ...] = (0.0, 0.0, 0.0)  # CoM of the platform less the file's [m]
     # of load cells, (2 m,): gains minus 1, and readings without tension over the usual tension
     load_cells: tuple[float, ...] = ()
     cable_friction: tuple[float, ...] = ()  # dry friction of each cable beyond `friction`, (m,) [N]
@@ -59,7 +60,8 @@ def changed(robot: Robot, to: Parameters) -> Robot:
             winch = cable.winch.model_copy(update={"friction": max(cable.winch.friction + more + own, 0.0)})
             changes["winch"] = winch
         cables.append(cable.model_copy(update=changes))
-    platform = robot.platform.model_copy(update={"mass": robot.platform.mass * to.mass})
+    com = tuple(np.add(robot.platform.com, to.com).tolist())
+    platform = robot.platform.model_copy(update={"mass": robot.platform.mass * to.mass, "com": com})
     gravity = Rotation.from_rotvec([*to.tilt, 0.0]).apply(robot.gravity) if any(to.tilt) else robot.gravity
     return robot.model_copy(update={"cables": tuple(cables), "platform": platform, "gravity": tuple(gravity)})
 

@@ -252,6 +252,14 @@ def test_a_frame_that_is_not_level(logs):
     assert result.found[0].value[1] == pytest.approx(0.05, abs=4 * result.found[0].sigma[1])
 
 
+def test_a_wrong_com_is_no_tilt(logs):
+    wrong = PLANAR.model_copy(update={"platform": PLANAR.platform.model_copy(update={"com": (0.03, 0.0, 0.02)})})
+    result = replay(wrong, logs["lengths"])
+    assert result.named == ["com"]
+    assert result.found[0].value[0] == pytest.approx(-0.03, abs=0.003)
+    assert "CoM explains" in result.report()
+
+
 def test_a_winch_that_slips_is_in_the_summary(tmp_path):
     """Its windows are outliers, and the summary was that the model reproduces the recording."""
     found = columns("lengths", every("lengths"))
