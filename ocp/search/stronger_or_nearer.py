@@ -105,22 +105,32 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
 
 
 def _without_regions(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> list[Relaxed]:
-    """Return, for a free position, how many regions can stay without those that the closest motion passes through."""
-    change = _fewer_regions(scenario, audit) if scenario.task.tube.position == "free" else None
-    if change is None:
-        return []
-    without, name = change.at(0.0)[0].lasting(scenario.duration), f"audit, other {change.name}"
-    closest = search.audit_motion(without, deviation, name)
-    plan = Plan(without, MotionStatus.FEASIBLE, deviation, closest, 0.0, 0.0) if closest.passed else None
-    plan = plan or planned(search, without, name, deviation)
-    return [] if plan is None else [change.offer(0.0, plan)]
+    """Return, for a free position, how many regions can stay: without those that the closest motion passes through.
+
+    If no motion is found with these, it is without any; a motion that is not found without any is not with some.
+    """
+    found = list[Relaxed]()
+    changes = (_fewer_regions(scenario, None), _fewer_regions(scenario, audit)) if _blocked(audit) else ()
+    for change in changes if scenario.task.tube.position == "free" else ():
+        if change is None:
+            break
+        without, name = change.at(0.0)[0].lasting(scenario.duration), f"audit, other {change.name}"
+        closest = search.audit_motion(without, deviation, name)
+        plan = Plan(without, MotionStatus.FEASIBLE, deviation, closest, 0.0, 0.0) if closest.passed else None
+        plan = plan or planned(search, without, name, deviation if found else None)
+        if plan is None:
+            break
+        found = [change.offer(0.0, plan)]
+    return found
 
 
-def _fewer_regions(scenario: Scenario, audit: Audit) -> Change | None:
-    """Return the change of the regions to those from which the audited motion keeps its clearances."""
+def _fewer_regions(scenario: Scenario, audit: Audit | None) -> Change | None:
+    """Return the change of the regions to those from which the audited motion keeps its clearances; None: to none."""
     limits, given = scenario.task.limits, scenario.task.limits.keep_out
-    through = {excess.about.partition(" outside ")[2] for excess in audit.excess if excess.limit == "keep_out"}
-    kept = tuple(region for region in given if region.name not in through)
+    excesses = () if audit is None else audit.excess
+    through = {excess.about.partition(" outside ")[2] for excess in excesses if excess.limit == "keep_out"}
+    kept = () if audit is None else tuple(region for region in given if region.name not in through)
+    through = through or {region.name for region in given}
     if len(kept) == len(given):
         return None
 
