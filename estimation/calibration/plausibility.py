@@ -27,7 +27,7 @@ from ..logs.clocks import LIKE, SURELY, realigned
 from ..logs.measurements import Measurements, check_measurements, measured, measured_poses, tracked
 from .attitudes import misread_attitudes
 from .differences import AS_GIVEN, FEWEST, PLAUSIBLE, LogPart, medians
-from .frames import Frames, displaced_frames, fitted_frames, in_convention
+from .frames import displaced_frames, fitted_frames, in_convention
 from .geometry import length_of
 from .interpretations import FACTORS, Interpretation, interpretations
 from .parameters import Parameters
@@ -140,7 +140,7 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
             if step and step < LAST_STEP:
                 part = log._replace(y=log.y[:, way.columns] * factors, rotation=log.at(read)[1])
             elif way.weighted * way.way.factor < left_before and way.size < EXPLAINED * change:
-                text = _in_frame(frames._replace(size=way.size), as_given)
+                text = _better(str(frames), as_given, way.size)
                 text = ", and ".join(filter(None, (way.text, read.text, text)))
                 corrected = _corrected(given, (*moved, None), way.columns, factors, frames.found)
                 return Mistake(text, corrected, factors=factors)
@@ -157,11 +157,6 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
         corrected = None if several else _corrected(given, whole.at(best.way), best.columns, factors)
         return Mistake(text, corrected, factors=factors)
     return None if far or not framed else _displaced(log, given, noise)
-
-
-def _in_frame(frames: Frames, before: float) -> str:
-    """Return the error of poses in another frame."""
-    return _better(str(frames), before, frames.size)
 
 
 def _better(text: str, before: float, after: float) -> str:
@@ -205,7 +200,9 @@ def _displaced(log: LogPart, given: Measurements, noise: float) -> Mistake | Non
     corrected = _corrected(given, (*frames.of(position, rotation), None), np.arange(robot.m), 1.0, frames.found)
     shift, turn = frames.inner
     moved = np.linalg.norm(robot.attachments @ (turn - np.eye(3)).T + shift, axis=1).max()
-    return Mistake(_in_frame(frames, before), corrected, severe=bool(moved > PLAUSIBLE * length_of(robot)))
+    return Mistake(
+        _better(str(frames), before, frames.size), corrected, severe=bool(moved > PLAUSIBLE * length_of(robot))
+    )
 
 
 def _part(robot: Robot, part: Measurements, table: np.ndarray) -> LogPart:
