@@ -18,6 +18,7 @@ MOST_FIELDS = 2_000_000  # some microseconds each; NetCDF may have more
 MOST_COLUMNS = 1000
 BLOCK = 2_000_000  # characters
 ENDS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"  # of lines, for `str.splitlines`
+MISSING = {"", "na", "n/a", "#n/a", "null", "none", "-"}  # what may stand for a missing number
 Rows = list[tuple[int, str]]  # some lines of a file, with their numbers from 1
 
 
@@ -145,12 +146,12 @@ def _numbers(rows: Rows, mark: str, titles: list[str], used: list[int], gaps: bo
 
 
 def _value(cell: str, gaps: bool) -> float:
-    """Return the number of a field, nan of an empty one where that may be, and infinity of any other."""
+    """Return the number of a field, nan of a missing one where that may be, and infinity of any other."""
     try:
         value = float(cell)
         return value if gaps or not math.isnan(value) else math.inf
     except ValueError:
-        return math.nan if gaps and not cell.strip() else math.inf
+        return math.nan if gaps and cell.strip().lower() in MISSING else math.inf
 
 
 def _filled(line: str, mark: str) -> str:

@@ -126,6 +126,8 @@ def _of_log(robot: Robot, logs: list[Path], fields: Path | None, sigma: str, out
             size = quantity(middle, "mm" if i < 3 else "mrad", 3) if np.isfinite(middle) else "undetermined"
             size = size if robot.dof_mask[i] else "fixed"
             typer.echo(f"  median sigma of {name}: {size}")
+        if not np.isfinite(sigmas).all():
+            typer.echo("  a motion of the platform changes none of the readings: poses are undetermined along it")
         for line in (_included(found.estimate), *read.notes, *found.lines()):
             typer.echo(f"  {line}")
         print_written(files)

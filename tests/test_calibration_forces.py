@@ -231,6 +231,6 @@ def test_cables_without_tension_are_left_out():
     pull[2, 1], pull[:, 3] = 0.3, 0.0
     expected = np.zeros((8, 4), dtype=bool)
     expected[2, 1] = True
-    for poses, left in ((None, expected), (np.zeros((8, 6)), 0 * expected)):
+    for poses in (None, np.zeros((8, 6))):
         log = Measurements(np.full((8, 4), 3.0), poses, tensions=pull)
-        np.testing.assert_array_equal(slack(as_robot(file), log), left)
+        np.testing.assert_array_equal(slack(as_robot(file), log), expected)

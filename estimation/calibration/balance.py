@@ -197,6 +197,13 @@ class Balance:
         inverse_root = np.linalg.inv(np.linalg.cholesky(M)) if finite else None
         return _Forces(record, poses, tensions, by_tensions, A, r, inner, variances, inverse_root, pull, motion.by_arm)
 
+    def masses(self, of: Parameters, x: np.ndarray, placed: tuple[np.ndarray, np.ndarray], clock: float) -> np.ndarray:
+        """Return the mass that the tensions carry at each sample [kg], (N,); arguments as for `at`."""
+        forces = self._forces(of, x, placed, clock, 1.0)
+        return np.asarray(
+            x[of.clock + 1] - np.einsum("ni,ni->n", forces.r[:, :3], forces.pull) / (forces.pull**2).sum(1)
+        )
+
     def felt(self, table: np.ndarray, noise: float) -> FeltTensions:
         """Return the measured tensions, smoothed, with errors that make cables seem stiffer unless they are unknowns.
 

@@ -69,16 +69,58 @@ BOTH = (True, True)
 
 def fitted_frames(log: LogPart) -> Frames:
     """Return the frames that fit the lengths of a log best: one if it fits nearly as well as both."""
-    few, home = _few(log), points.rotations(log.robot.home[3:])
+    few = _few(log)
+    tried = sorted(_descended(few, _starts(few), BOTH, FEW), key=lambda one: one.size)[:KEPT]
+    return _simplest(few, min(_descended(few, tried, BOTH, MANY), key=lambda one: one.size))
+
+
+def fitted_orders(log: LogPart) -> list[np.ndarray]:
+    """Return orders of the readings (m,) with which frames fit a log best, up to scales and signs.
+
+    A symmetric robot looks like itself in several orders: those in which the simplest frames fit nearly as well.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    few = _few(log)
+    y = (few.y - few.y.mean(axis=0)).T
+    y /= np.maximum(np.linalg.norm(y, axis=1, keepdims=True), 1e-300)
+    found = _starts(few)
+    orders: list[tuple[int, ...]] = []
+    for steps in (FEW, MANY):
+        parts = [np.stack(part) for part in zip(*((*one.outer, *one.inner) for one in found), strict=True)]
+        lengths = _residuals(few._replace(y=0 * few.y), parts)[0].reshape(len(found), log.robot.m, -1)
+        lengths -= lengths.mean(axis=2, keepdims=True)
+        left = (lengths**2).sum(axis=2)[..., None] - (lengths @ y.T) ** 2  # of cable i by the reading of cable j
+        ways = [linear_sum_assignment(one)[1] for one in left]
+        sizes = [float(one[range(len(way)), way].sum()) for one, way in zip(left, ways, strict=True)]
+        first: dict[tuple[int, ...], Frames] = {}
+        for k in np.argsort(sizes):
+            first.setdefault(tuple(ways[k].tolist()), found[k])
+        orders = list(first)[:KEPT]
+        found = [
+            _descended(few._replace(y=few.y[:, order], counted=True), [first[order]], BOTH, steps)[0]
+            for order in orders
+        ]
+    least = SIMPLER * min(one.size for one in found)
+    parts = (
+        (one, few._replace(y=few.y[:, order], counted=True), order) for one, order in zip(found, orders, strict=True)
+    )
+    simple = [(_simplest(part, one), order) for one, part, order in parts if one.size < least]
+    counts = [sum((t.any() or (NONE[1] != T).any()) for t, T in (one.outer, one.inner)) for one, _ in simple]
+    return [np.array(order) for (_, order), count in zip(simple, counts, strict=True) if count == min(counts)]
+
+
+def _starts(few: LogPart) -> list[Frames]:
+    """Return frames as in the file, and those turned by right angles, with the mean pose at home."""
+    home = points.rotations(few.robot.home[3:])
     middle, mean = few.position.mean(axis=0), Rotation.from_matrix(few.rotation).mean().as_matrix()
     right_angles = Rotation.create_group("O")
     turns = [*right_angles.as_matrix(), *(Rotation.from_euler("z", 45, degrees=True) * right_angles).as_matrix()]
     starts = [Frames(NONE, NONE)]
     for turn in turns:
-        outer = (log.robot.home[:3] - turn @ middle, turn)
+        outer = (few.robot.home[:3] - turn @ middle, turn)
         starts += [Frames(outer, NONE), Frames(outer, (np.zeros(3), (turn @ mean).T @ home))]
-    tried = sorted(_descended(few, starts, BOTH, FEW), key=lambda one: one.size)[:KEPT]
-    return _simplest(few, min(_descended(few, tried, BOTH, MANY), key=lambda one: one.size))
+    return starts
 
 
 def in_convention(log: LogPart, frames: Frames) -> tuple[Frames, Interpretation]:

@@ -14,12 +14,13 @@ If nothing explains the differences, poses may have been measured in another fra
 a frame near the file's is named, but not refused, if it explains most of the differences up to an offset.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from ...base.display import record
-from ...base.text import quantity
+from ...base.text import counted, quantity
 from ...models import points
 from ...models.files import as_robot
 from ...models.robot import Robot
@@ -27,7 +28,7 @@ from ..logs.clocks import LIKE, SURELY, realigned
 from ..logs.measurements import Measurements, check_measurements, measured, measured_poses, tracked
 from .attitudes import misread_attitudes
 from .differences import AS_GIVEN, FEWEST, PLAUSIBLE, LogPart, medians
-from .frames import displaced_frames, fitted_frames, in_convention
+from .frames import displaced_frames, fitted_frames, fitted_orders, in_convention
 from .geometry import length_of
 from .interpretations import FACTORS, Interpretation, interpretations
 from .parameters import Parameters
@@ -118,7 +119,9 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     named = best.weighted < as_given and best.size < EXPLAINED * change
     far = best.size * best.way.factor > FAR * noise if named else as_given > EXPLAINED * change
     whole = _part(robot, given, table) if named or far else log
-    if far and framed and len(log.y) >= FEWEST[1]:
+    given_order = log
+    for first, rivals in _orders(log) if far and framed and len(log.y) >= FEWEST[1] else ():
+        log = given_order._replace(y=given_order.y[:, first])
         part, read = log, AS_GIVEN
         for step in range(LAST_STEP + 1):
             part = part._replace(counted=step == 1)
@@ -141,8 +144,11 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
                 part = log._replace(y=log.y[:, way.columns] * factors, rotation=log.at(read)[1])
             elif way.weighted * way.way.factor < left_before and way.size < EXPLAINED * change:
                 text = _better(str(frames), as_given, way.size)
-                text = ", and ".join(filter(None, (way.text, read.text, text)))
-                corrected = _corrected(given, (*moved, None), way.columns, factors, frames.found)
+                texts = _and("", first, np.ones(robot.m)), way.text, read.text, text
+                text = ", and ".join(filter(None, texts))
+                if rivals:
+                    return Mistake(f"{text}; but {counted(rivals, 'other order')} in other frames fit as well", None)
+                corrected = _corrected(given, (*moved, None), first[way.columns], factors, frames.found)
                 return Mistake(text, corrected, factors=factors)
     if named:
         factors = best.signs * best.way.factor
@@ -157,6 +163,15 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
         corrected = None if several else _corrected(given, whole.at(best.way), best.columns, factors)
         return Mistake(text, corrected, factors=factors)
     return None if far or not framed else _displaced(log, given, noise)
+
+
+def _orders(log: LogPart) -> Iterator[tuple[np.ndarray, int]]:
+    """Yield the order of the readings as given, and that in which frames fit best, with how many fit as well."""
+    given = np.arange(log.robot.m)
+    yield given, 0
+    first, *others = fitted_orders(log)
+    if (first != given).any():
+        yield first, len(others)
 
 
 def _better(text: str, before: float, after: float) -> str:

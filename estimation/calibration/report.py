@@ -9,9 +9,9 @@ from ...base.text import counted, quantity
 from ...figures.drawing import Drawing
 from ...figures.report import Part, Report, Section, Table
 from ...models.parsing import to_yaml
-from ..logs.load_cells import slack
 from .file_errors import ENDS
 from .geometry import length_of
+from .left_out import left_out
 from .result import CalibrationData, Parameter
 from .solving import is_still
 from .turning import turning
@@ -181,10 +181,11 @@ def _of_exceptions(result: CalibrationData) -> list[str]:
         f"{'longer' if slip.size > 0 else 'shorter'} than its reading (+- {_mm(slip.sigma)})"
         for slip in result.slips
     ]
-    loose = slack(result.file, result.measurements).sum(axis=0)
-    if loose.any():
-        named = ", ".join(f"cables[{i}] ({loose[i]})" for i in np.flatnonzero(loose))
-        lines.append(f"left out: readings of cables that hardly pull, which may be slack: {named}")
+    for why, which in left_out(result.file, result.measurements).items():
+        count = which.sum(axis=0)
+        if count.any():
+            named = ", ".join(f"cables[{i}] ({count[i]})" for i in np.flatnonzero(count))
+            lines.append(f"left out: readings of {why}: {named}")
     wrong = sorted(result.outliers, key=lambda one: -abs(one.error))
     whole = len({one.sample for one in wrong if one.others})
     if whole and result._noise.redundancy < len(result.parameters):

@@ -17,7 +17,9 @@ from ...models.part import LARGEST
 from ...models.robot import Robot
 from ..logs.measurements import Measurements
 from .cross_validation import HeldOut, compare, poses_fitted
+from .differences import PLAUSIBLE
 from .geometry import length_of
+from .load_changes import load_changes
 from .outliers import Outlier, Slip
 from .parameters import OF_ROBOT
 from .plausibility import Mistake
@@ -79,7 +81,8 @@ class CalibrationData(Displayed):
         """Return why `save` and `towline calibrate` do not write the robot, in one line; None if they do.
 
         The log probably has an input error, the fit did not converge, an end of a cable or the CoM would move by more
-        than half of the cables' length, or validation samples fit worse than with the file's robot.
+        than half of the cables' length (3 % if winches are locked), residuals exceed 3 % of it, the mass changes, or
+        validation samples fit worse than with the file's robot.
         """
         if self.doubt is not None:
             return self.doubt
@@ -89,6 +92,14 @@ class CalibrationData(Displayed):
             return "the file predicts validation samples as well as any parameters would: there is nothing to change"
         if self.undetermined is not None:
             return self.undetermined
+        if self.residual_after > PLAUSIBLE * length_of(self.file):
+            left = quantity(1e3 * self.residual_after, "mm", digits=3)
+            return (
+                f"no anchors and offsets explain the log: they leave residuals of {left}, so check clocks and sensors"
+            )
+        if loads := load_changes(self._solved.model, self._solved.fit.state) if "mass" in self.free else []:
+            texts = [f"{quantity(mass, 'kg', digits=3)} from sample {begin} on" for begin, mass in loads]
+            return f"the mass changes during the log: {', '.join(texts)}; calibrate each part alone"
         held_out = self.held_out
         if np.isfinite(held_out.after) and held_out.after > max(held_out.before, EXACT * self.stated_sigma):
             before, after = (quantity(1e3 * error, "mm", digits=3) for error in (held_out.before, held_out.after))
@@ -103,10 +114,11 @@ class CalibrationData(Displayed):
         """Return which end of a cable, or the CoM, would move too far to be real, in one line, or None."""
         ends = (one for one in self.parameters if ".a" in one.name or one.name.startswith("com"))
         far, length = max(ends, key=lambda one: abs(one.correction), default=None), length_of(self.file)
-        if far is None or abs(far.correction) <= FARTHEST * length:
+        still = is_still(self.measurements) and self.measurements.carrier_poses is None
+        if far is None or abs(far.correction) <= (PLAUSIBLE if still else FARTHEST) * length:
             return None
         by, of = (quantity(size, "m", digits=3) for size in (abs(far.correction), length))
-        hint = "; the readings hardly change: try --free offsets" if is_still(self.measurements) else ""
+        hint = "; the readings hardly change: try --free offsets, or give a prior" if still else ""
         return f"the log does not determine {far.name}: it would move by {by}, and cables are {of} long{hint}"
 
     @property

@@ -9,7 +9,6 @@ from ...base.errors import InputError
 from ...base.text import counted
 from ...models.robot import Robot
 from ..logs.cable_directions import placed
-from ..logs.load_cells import slack
 from ..logs.measurements import Measurements, measured, measured_poses, tracked
 from ..logs.pose_track import PoseTrack
 from .autocorrelation import information_of
@@ -19,6 +18,7 @@ from .carrier_motion import CarrierMotion
 from .clock import CLOCK_RANGE, begin_with_clock, moves_smoothly
 from .fit import Fit, fit
 from .geometry import length_of
+from .left_out import left_out
 from .model import Model, State
 from .normal_equations import metric
 from .observability import Observability
@@ -234,7 +234,8 @@ def model_of(
     `track` is that of a model with the same poses, which needs as much memory as the log.
     """
     parameters = Parameters(robot, groups)
-    model = Model(parameters, measurements, prior, ~slack(robot, measurements).T, forces=Balance(robot, measurements))
+    taken = ~np.any(list(left_out(robot, measurements).values()), axis=0).T
+    model = Model(parameters, measurements, prior, taken, forces=Balance(robot, measurements))
     if "clock" in groups:
         if track is None:
             position, rotation, _ = measured_poses(robot, measurements)

@@ -25,7 +25,12 @@ COARSER, SURE, LONGEST_STEP = (4, 16), 0.9, 0.5  # times the finest step, the co
 STEPS = 20
 Signals = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
 LARGEST_DRIFT, USUAL_DRIFT = 0.01, 1e-4
+JUMP, MOST_JUMPS, NO_JUMP = 5.0, 4, 0.5  # usual steps, gaps that are tried, and what is left without a jump
 CORRELATED = 5.0  # by which the errors of a model exceed those of as much noise
+
+
+class ClockJumpError(InputError):
+    """A clock that was set while it recorded."""
 
 
 class Clock(NamedTuple):
@@ -54,6 +59,42 @@ def align(
 
     Raises `InputError` if the speeds have too little in common.
     """
+    clock, left = _aligned(times, readings, pose_times, lengths, poses)
+    if left > MOST_LEFT:
+        share = quantity(100 * left, "%", 2)
+        raise InputError(f"lengths and poses must be of one motion, got poses that leave {share} of it unexplained")
+    return clock
+
+
+def check_jumps(
+    times: np.ndarray, readings: np.ndarray, pose_times: np.ndarray, lengths: np.ndarray, poses: np.ndarray
+) -> None:
+    """Raise InputError if a gap in one of the clocks must be a jump, because the motion went on without it.
+
+    Arguments as for `align`.
+    """
+    left = np.inf
+    for which, own in (("lengths", times), ("poses", pose_times)):
+        steps = np.diff(own)
+        usual = float(np.median(steps))
+        wide = np.flatnonzero(steps > JUMP * usual)
+        for k in wide[np.argsort(-steps[wide])[:MOST_JUMPS]]:
+            if left == np.inf:
+                left = _aligned(times, readings, pose_times, lengths, poses)[1]
+            jump = float(steps[k]) - usual
+            closed = np.where(np.arange(len(own)) > k, own - jump, own)
+            both = (closed, pose_times) if own is times else (times, closed)
+            if _aligned(both[0], readings, both[1], lengths, poses)[1] < NO_JUMP * left:
+                raise ClockJumpError(
+                    f"times of the {which} must be of one clock, got one that seems to jump by "
+                    f"{quantity(jump, 's', digits=3)} at {own[k]:.3f} s; cut the log there"
+                )
+
+
+def _aligned(
+    times: np.ndarray, readings: np.ndarray, pose_times: np.ndarray, lengths: np.ndarray, poses: np.ndarray
+) -> tuple[Clock, float]:
+    """Return the clock, and the part of the lengths' changes that the poses leave unexplained; arguments as `align`."""
     found = [coarse(times, readings, pose_times, lengths)]
     if found[0][2] < SURE:  # poses in another frame still show how fast the platform is
         offset, _, likeness = coarse(times, readings, pose_times, poses[:, :3], _whole_speed)
@@ -63,10 +104,7 @@ def align(
         for offset, order, likeness in found
     ]
     clock, left, likeness = min(fitted, key=lambda one: one[1])
-    if left > MOST_LEFT:
-        share = quantity(100 * left, "%", 2)
-        raise InputError(f"lengths and poses must be of one motion, got poses that leave {share} of it unexplained")
-    return clock._replace(likeness=likeness)
+    return clock._replace(likeness=likeness), left
 
 
 def coarse(

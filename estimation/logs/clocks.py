@@ -10,7 +10,7 @@ from ...base.errors import InputError
 from ...models import points
 from ...models.dynamics import Dynamics
 from ...models.robot import Robot
-from .alignment import Clock, align
+from .alignment import Clock, ClockJumpError, align, check_jumps
 from .cable_directions import vectors
 from .carrier_poses import angles_at, carriers_at
 from .encoders import locked
@@ -53,6 +53,8 @@ def clock_of_poses(
             return None
         try:
             clock = aligned(lengths, position, quaternions, robot, given, from_)
+        except ClockJumpError:
+            raise
         except InputError:
             return None
         # That of another computer, which stamped the poses, is clearly far from the lengths'.
@@ -106,7 +108,10 @@ def aligned(
     effects = np.hstack(effects)
     effects = effects[:, np.ptp(effects, axis=0) > 1e-6]
     along = np.asarray(Dynamics(robot).cable_lengths(poses, carriers))
-    return align(lengths.times[complete], lengths.values[complete], position.times[rows], along, effects)
+    signals = lengths.times[complete], lengths.values[complete], position.times[rows], along, effects
+    if of_poses:
+        check_jumps(*signals)
+    return align(*signals)
 
 
 def realigned(
@@ -128,7 +133,11 @@ def realigned(
     position, rotation, _ = measured_poses(robot, measurements)
     track = PoseTrack((times - clock.offset) / clock.rate, position, rotation, known).at_times(times[rows])
     position, rotation = track.at(0.0)[:2]
-    moved = np.where(np.isfinite(poses[rows]), np.hstack([position, points.angles(rotation)]), np.nan)
+    angles = points.angles(rotation)
+    if np.nanmax(np.abs(poses[:, 3:]), initial=0.0) > np.pi:  # such as degrees, which are read as they were logged
+        at = clock.offset + clock.rate * times[rows]
+        angles = np.stack([np.interp(at, times[known], column) for column in poses[known, 3:].T], axis=1)
+    moved = np.where(np.isfinite(poses[rows]), np.hstack([position, angles]), np.nan)
     return measurements.only(rows).changed(poses=moved).only(track.inside(0.0)), clock
 
 

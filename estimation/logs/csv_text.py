@@ -29,6 +29,7 @@ def plain_csv(text: str) -> str:
 
     Dates count from 1970, in UTC unless they name another zone, and times of day from midnight.
     """
+    text = f"#{text[1:]}" if text[:2] == "% " else text  # of MATLAB
     return _one_header(_with_points(_with_seconds(_with_tabs(text))))
 
 

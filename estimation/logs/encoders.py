@@ -1,10 +1,12 @@
-"""`lengths_of`: cable lengths from readings of the winches, and `locked`: whether these hardly change."""
+"""`lengths_of`: cable lengths from readings; `locked`, `unrolled`: readings that hardly change, or begin again."""
 
 import numpy as np
 
 from ...models.robot import Robot
 
 LOCKED = 1e-4  # of a length, by which noise may change the reading of a locked winch
+ROLLED, END = 0.9, 0.05  # of the range of readings: a jump from one end to the other, and what is near an end
+PERIODS = (*(2.0**k for k in range(8, 33)), 360.0, 2 * np.pi)  # of counters, and of angles in deg and rad
 
 
 def lengths_of(robot: Robot, readings: np.ndarray, tensions: np.ndarray | None = None) -> np.ndarray:
@@ -26,3 +28,30 @@ def locked(lengths: np.ndarray) -> bool:
     """Return whether readings (N, m) hardly change, as those of locked winches."""
     known = lengths[np.isfinite(lengths).all(axis=1)]
     return len(known) > 1 and bool((np.ptp(known, axis=0) <= LOCKED * np.abs(known).max(axis=0)).all())
+
+
+def unrolled(readings: np.ndarray) -> tuple[np.ndarray, list[int]]:
+    """Return readings (N, m) without the jumps of counters and angles that begin again, and the columns that had some.
+
+    These go from one end of their range to the other in one step, always by the same amount.
+    """
+    result, rolled = readings.copy(), list[int]()
+    for i, column in enumerate(readings.T):
+        rows = np.flatnonzero(np.isfinite(column))
+        y, steps = column[rows], np.diff(column[rows])
+        whole = float(np.ptp(y)) if len(y) > 2 else 0.0
+        jumps = np.flatnonzero(np.abs(steps) > ROLLED * whole)
+        smooth = np.delete(steps, jumps)
+        if not jumps.size or not smooth.size or np.abs(smooth).max() > END * whole:
+            continue
+        if not (y[jumps] * y[jumps + 1]).any():  # zeros of readings that are missing
+            continue
+        around = 0.5 * (steps[np.maximum(jumps - 1, 0)] + steps[np.minimum(jumps + 1, len(steps) - 1)])
+        periods = np.abs(steps[jumps] - np.where(np.abs(around) > END * whole, 0.0, around))
+        if np.ptp(periods) <= END * whole:
+            period = float(np.median(periods))
+            nearest = min(PERIODS, key=lambda one: abs(one - period))
+            period = nearest if abs(nearest - period) <= END * period else period
+            result[rows, i] = np.unwrap(y, period=period)
+            rolled.append(i)
+    return result, rolled

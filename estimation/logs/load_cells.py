@@ -6,7 +6,7 @@ import numpy as np
 
 from ...base.text import quantity
 from ...models.robot import Robot
-from .measurements import Measurements, measured_poses
+from .measurements import Measurements
 
 FEWEST = 6  # equal samples that are not due to chance
 LEVELS, RARE = 3, 5.0  # values compared with the largest one, and how many times rarer they are if it is a saturation
@@ -43,12 +43,9 @@ def unreadable(tensions: np.ndarray, lengths: np.ndarray) -> np.ndarray:
 
 
 def slack(robot: Robot, measurements: Measurements) -> np.ndarray:
-    """Return which cables seem slack by their tensions, (N, m) of bool; none if positions were measured, which show it.
-
-    Tensions that follow from thrusts are too uncertain.
-    """
-    tensions, known = measurements.tensions, measured_poses(robot, measurements)[2]
-    if tensions is None or known[:, :3].all() or any(carrier.actuators for carrier in robot.carriers):
+    """Return which cables seem slack by their tensions, (N, m) of bool; those from thrusts are too uncertain."""
+    tensions = measurements.tensions
+    if tensions is None or any(carrier.actuators for carrier in robot.carriers):
         return np.zeros(measurements.lengths.shape, dtype=bool)
     least = NO_TENSION * measurements.sigma.tensions * np.abs(tensions).mean()
     return (tensions < least) & ~unreadable(tensions, measurements.lengths)

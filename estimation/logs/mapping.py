@@ -26,6 +26,7 @@ TITLE = re.compile(r"(.+?)(?:\s+\[([^\]]*)\])?")
 OF_STRUCTURES = ("x", "y", "z", "w", "roll", "pitch", "yaw")
 MOST_LISTED = 12
 GREEK = re.compile(r"(?i)phi|theta|psi|heading")
+OF_PLATFORM = re.compile(r"(?i)(?<![a-z])(platform|payload|end[_ ]?effector|ee|tcp)(?![a-z])")
 BEHIND_NUMBER = re.compile(r"\d[_ ][^\]0-9]+\]$")  # words in the name of a joint
 
 
@@ -253,7 +254,7 @@ def _usual(
         if kind in AXES:
             if (others := next((one for one in OTHER_AXES if set(by_name) == set(one)), None)) is not None:
                 by_name = {axis: by_name[other] for axis, other in zip(AXES[kind], others, strict=True)}
-            axes = tuple(axis for axis in AXES[kind] if axis in free.split())
+            axes = tuple(axis for axis in AXES[kind] if axis in free.split() and kind != "quaternion")
             if kind in ("angles", "position") and 0 < len(axes) == len(by_name) < 3:  # of a planar robot, in any plane
                 by_name = dict(zip(axes, (by_name[name] for name in sorted(by_name)), strict=True))
             axes = axes if set(axes) == set(by_name) else AXES[kind]
@@ -293,6 +294,7 @@ def _usual(
         ("lengths tensions directions thrusts thrust_vectors", lambda one: measured_name(one[0].full) is None),
         ("lengths", lambda one: not re.search(TURNED, one[0].full.lower())),  # l1 rather than angle_1
         ("position", lambda one: "Pose" in one[0].topic.kind),  # messages of poses rather than transforms and scenes
+        ("position orientation", lambda one: bool(OF_PLATFORM.search(one[0].full))),  # rather than those of cameras
         (what, lambda one: not position or one[0].topic is position[0].topic),
     )
     for of, is_better in better:

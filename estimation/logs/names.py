@@ -107,6 +107,7 @@ PATTERNS = {
         rf"[%_]*({_BEFORE}(?:rosbag)?(?:time[_ ]?)?stamp)",
         r"(epoch|elapsed(?:[_ ]time)?|(?:sys(?:tem)?[_ ]?)?(?:ticks?|clock|uptime))",
         rf"{_BEFORE}((?:milli|micro|nano)s(?:ec(?:ond)?s?)?)",  # since an Arduino was switched on
+        "([mun]s(?:ec)?)",
     ),
 }
 DATES = 1e9, 4e9  # [s] from 1970, of recordings: 2001 to 2096
@@ -123,7 +124,9 @@ _MEASURED = re.compile(
     r"|mocap|vicon|optitrack|imu|ahrs)(?![a-z])"
 )
 _WORDS = {unit: unit.lower() for unit in ("cm", "ms", "us", "ns", "s", *FORCES)}  # of units
-_WORDS |= {"s": "s|secs?|seconds?", "ms": "ms|milliseconds?", "us": "us|microseconds?", "ns": "ns|nanoseconds?"}
+_SECONDS = "s(?:ec(?:ond)?s?)?"
+_WORDS |= {unit: f"(?:{word}){_SECONDS}" for unit, word in (("ms", "m|milli"), ("us", "u|micro"), ("ns", "n|nano"))}
+_WORDS["s"] = _SECONDS
 _WORDS |= {"cm": "cm|centimet(?:er|re)s?", "in": "in|inch(?:es)?"}
 _WORDS |= {"deg": "deg|degrees?|°", "rad": "rad|radians?", "m": "m|met(?:er|re)s?", "mm": "mm|millimet(?:er|re)s?"}
 _SUFFIX = re.compile(rf"(.+?)\s*(?:[_ ]|\()({'|'.join(_WORDS.values())})\)?")
@@ -136,7 +139,8 @@ ANGLE_OF |= {"phi": "roll", "theta": "pitch", "psi": "yaw", "heading": "yaw"}
 # Names of PLCs begin with a type (fbAxis), vectors of Simulink count from 1 (Quat(4)), and some names are German.
 _TYPE = re.compile(r"(?<![A-Za-z])(?:fb|st|lr|[afinr])(?=[A-Z][a-z])")
 _INDEX = re.compile(r"(?<![a-z])(q|quat(?:ernion)?|p|pos(?:ition)?|xyz|rpy|euler|angles?)\((\d+)\)")
-_GERMAN = {"zeit": "time", "stempel": "stamp", "winde": "winch", "seil": "cable", "kraft": "force", "länge": "length"}
+_GERMAN = {"uhrzeit": "time", "zeit": "time", "stempel": "stamp", "winde": "winch", "seil": "cable", "kraft": "force"}
+_GERMAN |= {"länge": "length", "plattform": "platform", "winkel": "", "nick": "pitch", "gier": "yaw"}
 
 
 class Role(NamedTuple):
@@ -196,8 +200,8 @@ def _role(which: str, match: re.Match[str], unit: str, name: str) -> Role:
         parts = [ANGLE_OF.get(parts[0], parts[0])]
     if which == "position":
         parts = [parts[0][0]]  # n of north
-    if which == "time" and (short := re.search("us(?:ec)?$|(milli|micro|nano)s", text)):
-        unit = {"milli": "ms", "nano": "ns"}.get(short[1] or "", "us")
+    if which == "time" and (short := re.search("([mun]|milli|micro|nano)s(ec(ond)?s?)?$", text)):
+        unit = unit_of(short[0])
     return Role(which, " ".join(parts), group, unit)
 
 

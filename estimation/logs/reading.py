@@ -16,7 +16,7 @@ from .alignment import Clock
 from .cable_directions import in_world, vectors
 from .carrier_poses import carriers_at, pulls_by_thrust
 from .clocks import Seen, clock_of_poses, set_clocks_of_carriers
-from .encoders import lengths_of
+from .encoders import lengths_of, unrolled
 from .frozen import seen
 from .load_cells import notes as unreadable_notes
 from .mapping import Field, Fields, LogMap, carrier_fields, fields_of, free_axes, listed, read_map
@@ -254,6 +254,11 @@ def measurements_of(
     read = Reader(found)
     position = _whole(robot, read.stream(found.position), 0) if found.position else None
     lengths = read.stream(main_fields)
+    values, rolled = unrolled(lengths.values)
+    if found.lengths and rolled:
+        lengths = Samples(lengths.times, values)
+        names = ", ".join(found.lengths[i].full for i in rolled)
+        notes.append(f"counters that begin again are continued: {names}")
     if not found.lengths and robot is not None:  # constant ones
         lengths = Samples(lengths.times, np.tile(np.asarray(robot.fixed_lengths), (len(lengths.values), 1)))
     if not len(lengths.values):

@@ -20,6 +20,7 @@ from .recording import Recording, Samples, Topic
 
 NANOSECONDS = re.compile(r"(?i)(?:nsecs?|nanosec(?:ond)?s?)$")
 MOST_FIELDS = 40_000_000  # of a CSV file
+CONTROLS = re.compile(rb"[\x00-\x08\x0e-\x1f]")  # which no text has
 ALWAYS_ACCEPTED = 40_000_000  # [bytes] of numbers, however well a log is compressed
 POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 POSE_UNITS = ("m", "m", "m", "rad", "rad", "rad")
@@ -35,7 +36,9 @@ def from_csv(content: bytes, where: str) -> Recording:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"must be a CSV file in UTF-8, or NetCDF, got other bytes (byte {error.start})") from None
+        if CONTROLS.search(content):
+            raise InputError(f"must be a CSV file in UTF-8, or NetCDF, got other bytes (byte {error.start})") from None
+        text = content.decode("cp1252", "replace")  # of spreadsheets in European languages
     if "\0" in text:
         raise InputError("must be a CSV file in UTF-8, or NetCDF, got binary data")
     del content

@@ -1,0 +1,75 @@
+"""`left_out`: readings that are no lengths of taut cables, because a cable is slack or an encoder stands still."""
+
+import numpy as np
+
+from ...models.dynamics import Dynamics
+from ...models.robot import Robot
+from ..logs.load_cells import SAME, slack
+from ..logs.measurements import Measurements, carriers_of, tracked
+from .differences import PLAUSIBLE
+from .geometry import length_of
+from .parameters import Parameters
+
+HARDLY = 0.1  # of the mean tension
+MOST_SLACK = 0.5  # of a cable's samples; more seem slack if the file or the poses are wrong
+CHUNK = 10_000  # samples
+
+
+def left_out(robot: Robot, measurements: Measurements) -> dict[str, np.ndarray]:
+    """Return which readings no fit uses, (N, m) of bool, by the reason."""
+    return {
+        "cables that hardly pull, which may be slack": slack(robot, measurements) | _loose(robot, measurements),
+        "encoders that stand still while their cables move": _still(robot, measurements),
+    }
+
+
+def _still(robot: Robot, measurements: Measurements) -> np.ndarray:
+    """Return which readings stay the same although poses show that the cable's length changes, (N, m) of bool.
+
+    It must change by more than displaced ends of cables explain; without poses, all other readings must. Winches that
+    are all locked hold still themselves.
+    """
+    y, known = measurements.lengths, tracked(robot, measurements)
+    rows, result = np.flatnonzero(known if known.any() else ~known), np.zeros(y.shape, dtype=bool)
+    same = np.abs(np.diff(y[rows], axis=0)) <= SAME * np.abs(y).max(axis=0)
+    if not same.any() or same.all():
+        return result
+    parameters = Parameters(robot, ())
+    lengths = parameters.table(parameters.first)[:, 7] * y[rows]
+    if known.any():
+        lengths = np.asarray(Dynamics(robot).cable_lengths(*_poses(robot, measurements, rows)))
+    for i in np.flatnonzero(same.any(axis=0)):
+        begins = np.flatnonzero(np.concatenate([[True], ~same[:, i]]))  # of parts with the same reading
+        of = lengths[:, [i]] if known.any() else np.delete(lengths, i, axis=1)
+        change = np.maximum.reduceat(of, begins) - np.minimum.reduceat(of, begins)
+        moved = change.min(axis=1) > PLAUSIBLE * length_of(robot)
+        result[rows, i] = np.repeat(moved, np.diff(begins, append=len(rows)))
+    return result
+
+
+def _loose(robot: Robot, measurements: Measurements) -> np.ndarray:
+    """Return which cables would hardly pull, or push, at measured poses of a platform at rest, (N, m) of bool.
+
+    Unless tensions were measured, the platform hangs from so few cables that its weight determines them.
+    """
+    result, known = np.zeros(measurements.lengths.shape, dtype=bool), tracked(robot, measurements)
+    axes = np.flatnonzero(robot.dof_mask)
+    flies = any(carrier.actuators for carrier in robot.carriers)
+    hangs = robot.m <= len(axes) and robot.weight > 0 and not flies and measurements.tensions is None
+    if not hangs or measurements.poses is None or not known.any() or np.isnan(measurements.poses[known][:, axes]).any():
+        return result
+    for rows in np.array_split(np.flatnonzero(known), len(known) // CHUNK + 1):
+        poses, carriers = _poses(robot, measurements, rows)
+        A = np.asarray(Dynamics(robot).wrench_matrix(poses, carriers))[:, axes] * robot.wrench_scale[axes, None]
+        wrench = np.asarray(Dynamics(robot).required_wrench(poses, 0 * poses, 0 * poses))[:, axes]
+        tensions = (np.linalg.pinv(A) @ (wrench * robot.wrench_scale[axes])[..., None])[..., 0]
+        result[rows] = tensions < HARDLY * np.abs(tensions).mean()
+    return np.asarray(result & (result.mean(axis=0) < MOST_SLACK))
+
+
+def _poses(robot: Robot, measurements: Measurements, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return poses of the platform, (k, 6), and of the carriers, (k, c, 6) or (c, 6) at home, at some samples."""
+    part = measurements.only(rows)
+    assert part.poses is not None  # where positions are tracked
+    poses = np.where(np.isfinite(part.poses), part.poses, robot.home)
+    return poses, carriers_of(robot, part)

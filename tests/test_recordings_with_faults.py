@@ -1,0 +1,140 @@
+"""Sensors that fail while they record: stuck encoders, counters that begin again, clocks that are set, slack cables."""
+
+import re
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+from towline import calibrate, read_measurements
+from towline.base.errors import InputError
+from towline.estimation.calibration import Measurements, corrected
+from towline.estimation.calibration import left_out as module
+from towline.estimation.calibration.left_out import left_out
+from towline.estimation.logs.encoders import unrolled
+from towline.models import Dynamics, load
+
+from .test_calibration_mistakes import a_log, seen
+from .user_recordings import FRAME, PLATFORM, robot_file, write
+
+ANCHORS = np.add(
+    FRAME, [[0.6, -0.4, -0.3], [0.1, 0.1, -0.5], [-0.2, 0.2, -0.2], [0.1, -0.2, -0.4]]
+)  # lines that do not meet
+REASON = "cables that hardly pull, which may be slack"
+TIMES = np.arange(0, 20, 0.05)
+POSE = [f"l{i}" for i in range(8)], ["x", "y", "z", "roll", "pitch", "yaw"]
+
+
+def a_motion(seed=0):
+    """Robot, poses (N, 6) at `TIMES`, readings, and anchors (8, 3) of a robot whose anchors are 2 cm off."""
+    robot, draw = load("cogiro"), np.random.default_rng(seed)
+    rates, phases = draw.uniform(0.4, 1.2, 6), draw.uniform(0, 6, 6)
+    poses = robot.home + [2, 1.5, 0.8, 0.15, 0.15, 0.2] * np.sin(np.outer(TIMES, rates) + phases)
+    anchors = np.asarray(robot.anchors) + draw.normal(0, 0.02, (8, 3))
+    ends = poses[:, None, :3] + robot.attachments @ Rotation.from_euler("xyz", poses[:, 3:]).as_matrix().swapaxes(1, 2)
+    y = np.linalg.norm(ends - anchors, axis=2) + draw.normal(0, 3e-4, (len(TIMES), 8)) - 0.05
+    return robot, poses, y, anchors
+
+
+@pytest.mark.parametrize("part", [slice(120, 240), slice(None)], ids=["for a while", "always"])
+def test_a_stuck_encoder_spoils_no_anchor(part):
+    robot, poses, y, anchors = a_motion()
+    y[part, 2] = y[part, 2][0]
+    result = calibrate(robot, Measurements(y, poses, times=TIMES), ["anchors", "offsets"])
+    assert result.refused is None
+    assert "encoders that stand still while their cables move: cables[2]" in result.report()
+    others = np.delete(np.arange(8), 2) if part == slice(None) else np.arange(8)
+    off = np.linalg.norm(np.asarray(result.robot.anchors) - anchors, axis=1)
+    assert off[others].max() < 0.01
+    if part == slice(None):  # the file's values are kept
+        np.testing.assert_array_equal(result.robot.anchors[2], robot.anchors[2])
+
+
+def test_counters_that_begin_again():
+    times = np.linspace(0, 9, 400)
+    whole = np.stack([40_000 * np.sin(times), 70_000 * np.cos(times), 900 * times], axis=1).round()
+    counted = whole.copy()
+    counted[:, :2] = (counted[:, :2] + 32_768) % 65_536 - 32_768
+    found, rolled = unrolled(counted)
+    assert rolled == [0, 1]
+    np.testing.assert_allclose(found - found[0], whole - whole[0])
+    lost = whole[:, [1]]
+    lost[100:120] = 0  # readings that are missing
+    np.testing.assert_array_equal(unrolled(lost)[0], lost)
+
+
+@pytest.mark.parametrize("jump", [0.8, 0.3])
+def test_a_clock_that_was_set_is_named(jump, tmp_path):
+    _, poses, y, _ = a_motion()
+    write(tmp_path / "winches.csv", ["t", *POSE[0]], np.column_stack([TIMES, y]))
+    at = 7.5 + TIMES + jump * (TIMES > 10)
+    write(tmp_path / "mocap.csv", ["t", *POSE[1]], np.column_stack([at, poses]))
+    with pytest.raises(InputError, match=rf"one that seems to jump by {jump} s at 17.5\d+ s; cut the log there"):
+        read_measurements(tmp_path / "winches.csv", poses=tmp_path / "mocap.csv", robot="cogiro")
+    kept = np.abs(TIMES - 10) > 0.5  # a gap of the same clock is none
+    write(tmp_path / "mocap.csv", ["t", *POSE[1]], np.column_stack([7.5 + TIMES, poses])[kept])
+    found = read_measurements(tmp_path / "winches.csv", poses=tmp_path / "mocap.csv", robot="cogiro")
+    assert len(found) > 300
+
+
+@pytest.mark.parametrize("loose", range(4))
+def test_cables_that_are_slack_by_the_weight(loose, tmp_path, monkeypatch):
+    """Three cables carry the platform, whose CoM is on the line of their pull: the fourth must be slack."""
+    others, place = np.delete(np.arange(4), loose), np.array([0.1, -0.1, 1.0])
+
+    def directions(yaw):
+        d = ANCHORS[others] - place - PLATFORM[others] @ Rotation.from_euler("z", yaw).as_matrix().T
+        return d / np.linalg.norm(d, axis=1)[:, None]
+
+    def moment(yaw):
+        arms, d = PLATFORM[others] @ Rotation.from_euler("z", yaw).as_matrix().T, directions(yaw)
+        return np.cross(arms, (d.T * np.linalg.solve(d.T, [0, 0, 5 * 9.81])).T).sum(axis=0)
+
+    yaw = brentq(lambda angle: moment(angle)[2], -1, 1)
+    of = Rotation.from_euler("z", -yaw).apply([-moment(yaw)[1], moment(yaw)[0], 0]) / (5 * 9.81)
+    robot = load(robot_file(tmp_path / "robot.yaml", ANCHORS, PLATFORM, [*place, 0, 0, yaw], com=of.tolist()))
+    log = Measurements(np.linspace(3, 4, 2)[:, None] + np.zeros(4), np.tile(robot.home, (2, 1)))
+    monkeypatch.setattr(module, "MOST_SLACK", 2.0)
+    pull = np.insert(np.linalg.solve(directions(yaw).T, [0, 0, 5 * 9.81]), loose, 0.0)
+    found = left_out(robot, log)[REASON]
+    np.testing.assert_array_equal(found[0], pull < 0.1 * np.abs(pull).mean())
+    assert not left_out(robot, Measurements(log.lengths, log.poses, tensions=np.full((2, 4), 9.0)))[REASON].any()
+
+
+def test_cables_in_another_order_in_a_turned_frame():
+    """Neither explains the log without the other; one frame is simpler than two, with which other orders fit too."""
+    robot, poses, y = a_log("cogiro", count=60)
+    frame = np.array([1.0, -2.0, 0.3]), Rotation.from_euler("z", 90, degrees=True)
+    found, texts = corrected(robot, Measurements(np.roll(y, 1, axis=1), seen(poses, frame)))
+    assert "in this order, and the poses seem to be measured in a frame" in texts[0]
+    np.testing.assert_array_equal(found.lengths, y)
+    assert np.abs(found.poses[:, :3] - poses[:, :3]).max() < 0.1
+
+
+def test_a_load_that_is_taken_up():
+    robot, poses, y, _ = a_motion()
+    masses = robot.platform.mass + np.where(np.arange(len(TIMES)) < 150, 0, 30)
+    wrench = np.array([0, 0, 9.81, 0, 0, 0]) * masses[:, None]
+    tensions = (np.linalg.pinv(Dynamics(robot).wrench_matrix(poses)) @ wrench[..., None])[..., 0]
+    result = calibrate(robot, Measurements(y[::5], poses[::5], tensions=tensions[::5]), ["offsets", "mass"])
+    assert re.fullmatch(r"the mass changes .*: \S+ kg from sample 0 on, \S+ kg from sample 30 on; .*", result.refused)
+
+
+def test_three_components_of_a_quaternion_are_no_angles(tmp_path):
+    _, poses, y, _ = a_motion()
+    write(tmp_path / "log.csv", ["ms", *POSE[0], "x", "y", "z", "qx", "qy", "qz"], np.column_stack([TIMES, y, poses]))
+    with pytest.raises(InputError, match="must have all columns qx, qy, qz, qw or none of them, got qx, qy, qz"):
+        read_measurements(tmp_path / "log.csv", robot="cogiro")
+
+
+def test_a_table_of_a_spreadsheet(tmp_path):
+    """Its text is in the code page of Western Europe, and missing numbers have words; milliseconds are times."""
+    _, _, y, _ = a_motion()
+    rows = [";".join([f"{1e3 * t:.0f}", *(f"{length:.4f}" for length in row)]) for t, row in zip(TIMES, y, strict=True)]
+    rows[7] = f"350;{';'.join(['#N/A'] * 8)}"
+    names = ";".join(["ms", *(f"Seillänge {i + 1}" for i in range(8))])
+    (tmp_path / "log.csv").write_bytes("\n".join([names, *rows]).encode("cp1252"))
+    found = read_measurements(tmp_path / "log.csv")
+    assert found.m == 8
+    np.testing.assert_allclose(found.times, np.delete(TIMES, 7))
