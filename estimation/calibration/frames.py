@@ -88,7 +88,7 @@ def fitted_orders(log: LogPart) -> list[np.ndarray]:
     orders: list[tuple[int, ...]] = []
     for steps in (FEW, MANY):
         parts = [np.stack(part) for part in zip(*((*one.outer, *one.inner) for one in found), strict=True)]
-        lengths = _residuals(few._replace(y=0 * few.y), parts)[0].reshape(len(found), log.robot.m, -1)
+        lengths = _residuals(few._replace(y=0 * few.y), parts)[0][:, : few.y.size].reshape(len(found), log.robot.m, -1)
         lengths -= lengths.mean(axis=2, keepdims=True)
         left = (lengths**2).sum(axis=2)[..., None] - (lengths @ y.T) ** 2  # of cable i by the reading of cable j
         ways = [linear_sum_assignment(one)[1] for one in left]
