@@ -134,7 +134,7 @@ class LengthControl(Controller):
 
     @override
     def follow(self, references: Sequence[Reference], period: float, start: float = 0.0) -> None:
-        """Learn the period, and warn if winches that hold each length for it would change tensions by their mean."""
+        """Learn the period; warn if tensions would change by their mean, as winches hold each length for a period."""
         self._period = number("period", period, 1e-6, 1e3)
         lag = max(self._lag, QUICKEST)
         lead, stride = _lead(lag, self._period), 1 + len(references) // SAMPLED
