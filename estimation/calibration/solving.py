@@ -31,6 +31,7 @@ from .starts import fit_from, level_poses
 
 WINDING = 10.0  # standard deviations of readings that change, and so show a clock offset
 LOOSE, LOOSE_SHARE = 0.1, 0.03  # [m] of standard deviation, and share of the cables' length: files are usually better
+FEWEST_KNOWN, MEDIAN = 3, 0.455  # directions whose changes show the file's errors; median of chi-square with 1 degree
 NEARLY_LOOSE = 0.01  # of the variance, below which residuals are never large enough to make it so large
 ROUNDS = 30  # of fits, each without the wrong readings of those before
 FEW = 0.02  # of the samples
@@ -142,7 +143,8 @@ def _determined(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
     """Return the model that keeps the file's values where the log knows ends of cables and offsets worse, and its fit.
 
     These are directions with a standard deviation beyond the limit along which the fit went farther than that, without
-    a prior, which would hold them.
+    a prior, which would hold them. The limit is larger if changes along the other directions show larger errors of the
+    file, as of large robots.
     """
     of = model.parameters
     lengths = np.flatnonzero(np.array(of.units)[of.varies] == "m")
@@ -153,13 +155,14 @@ def _determined(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
         if np.linalg.eigvalsh(seen.covariance[block])[-1] < NEARLY_LOOSE * limit:
             break
         values, vectors = np.linalg.eigh(noise_of(Solved(model, result, (), (), seen)).covariance[block])
-        if values[-1] <= limit:
-            break
-        loose = np.zeros((len(seen.covariance), int((values > limit).sum())))
-        loose[lengths] = vectors[:, values > limit]
-        away = ((result.state.x - of.first) * metric(model))[of.varies] @ loose
-        if away @ away <= limit:
+        away = ((result.state.x - of.first) * metric(model))[of.varies][lengths] @ vectors
+        known = values <= limit
+        shown = float(np.median(away[known] ** 2 - values[known])) / MEDIAN if known.sum() >= FEWEST_KNOWN else 0.0
+        far = values > max(limit, shown)
+        if away[far] @ away[far] <= limit:
             break  # about where the file has them
+        loose = np.zeros((len(seen.covariance), int(far.sum())))
+        loose[lengths] = vectors[:, far]
         kept, state = keeping(model, result.state, loose)
         found, scale = fit(kept, state, length), metric(model)
         before, after = (np.linalg.norm((one.state.x - of.first) * scale) for one in (result, found))
