@@ -115,10 +115,12 @@ def workspace(
         written.append(surface.save(mesh))
     summary = _summary(result, metric or [])
     reason = None if summary["accepted"] else required.why_nowhere(loaded)
+    about_lengths = f"{required.kind} allows any cable lengths, but they are constant; see `towline robots {robot}`"
+    note = about_lengths if loaded.fixed_lengths is not None and required.takes_every_row else None
     if as_json:
-        print_json({**summary, "reason": reason, "file": target, "figure": figure, "mesh": mesh})
+        print_json({**summary, "reason": reason, "note": note, "file": target, "figure": figure, "mesh": mesh})
     else:
-        _show(result, summary, size, reason)
+        _show(result, summary, size, {"why": reason, "note": note})
         print_written(written)
     if not summary["accepted"]:
         raise typer.Exit(1)
@@ -241,7 +243,7 @@ def _range(values: xr.DataArray) -> dict[str, Any]:
     return {"min": low, "median": middle, "max": high, "unit": values.attrs["units"]}
 
 
-def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None, reason: str | None) -> None:
+def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None, remarks: dict[str, str | None]) -> None:
     import math
 
     from ..base.text import quantity, quantity_range
@@ -249,8 +251,7 @@ def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None, reaso
     accepted, samples = summary["accepted"], summary["samples"]
     share = f"{100 * accepted / samples:.2f} %"
     typer.echo(f"{summary['robot']}: {quantity(accepted)} of {quantity(samples)} samples accepted ({share})")
-    if reason is not None:
-        typer.echo(f"  why: {reason}")
+    typer.echo("".join(f"  {name}: {text}\n" for name, text in remarks.items() if text is not None), nl=False)
     low, high = summary["volume_interval"]
     unit = summary["volume_unit"].replace("1", "")
     between = f", from {quantity_range((low, high), unit, digits=6)}"

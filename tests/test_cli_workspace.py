@@ -144,6 +144,14 @@ def test_too_few_cables_report_why_and_what_to_request(tmp_path):
         assert json.loads(other.stdout)["accepted"] > 5
 
 
+def test_cables_of_constant_length_do_not_let_the_platform_go(tmp_path):
+    """With its quadrotors at home, flycrane can be only where its cables have their lengths: at home."""
+    done = run("flycrane", "--samples", "50", cwd=tmp_path)
+    assert "  note: static-equilibrium allows any cable lengths, but they are constant; see " in done.stdout
+    told = json.loads(run("wang-flying", "--samples", "50", "--json", cwd=tmp_path).stdout)
+    assert told["note"] is None
+
+
 def test_a_picture_of_another_format_is_refused_before_any_work(folder):
     done = run("mass.yaml", "--figure", "f.jpg", cwd=folder, code=2)
     assert done.stdout == ""
@@ -155,6 +163,6 @@ def test_both_ends_of_a_range_have_one_unit(capsys):
     """A robot of a millimetre has bounds in millimetres at both ends of a range, not in metres at one of them."""
     summary = {"robot": "micro", "accepted": 9, "samples": 10, "volume": 2e-6, "volume_unit": "m^2", "seconds": 1.0}
     summary |= {"volume_interval": [np.nan, np.nan], "bounds": {"x": [-7.754e-4, 7.831e-4], "y": [0.0, 0.0]}}
-    _show(xr.Dataset(), summary, None, None)
+    _show(xr.Dataset(), summary, None, {})
     printed = capsys.readouterr().out.splitlines()
     assert printed[2:4] == ["  x -0.78 to 0.78 mm", "  y 0 m"]
