@@ -125,7 +125,7 @@ def _without_regions(search: Search, scenario: Scenario, deviation: Deviation | 
 
 
 def _fewer_regions(scenario: Scenario, audit: Audit | None) -> Change | None:
-    """Return the change of the regions to those from which the audited motion keeps its clearances; None: to none."""
+    """Return the change to the regions that the audited motion keeps clear of, or without an audit to no regions."""
     limits, given = scenario.task.limits, scenario.task.limits.keep_out
     excesses = () if audit is None else audit.excess
     through = {excess.about.partition(" outside ")[2] for excess in excesses if excess.limit == "keep_out"}
