@@ -115,7 +115,7 @@ def workspace(
         written.append(surface.save(mesh))
     summary = _summary(result, metric or [])
     reason = None if summary["accepted"] else required.why_nowhere(loaded)
-    about_lengths = f"{required.kind} allows any cable lengths, but they are constant; see `towline robots {robot}`"
+    about_lengths = f"the condition allows any cable lengths, but they are constant; see `towline robots {robot}`"
     note = about_lengths if loaded.fixed_lengths is not None and required.takes_every_row else None
     if as_json:
         print_json({**summary, "reason": reason, "note": note, "file": target, "figure": figure, "mesh": mesh})
@@ -202,10 +202,8 @@ def _region(box: str | None, attitude: str | None, carriers: str, lengths: str |
     if box is not None:
         region["position"] = _ends("--box", box, "x y z")
     if attitude is not None:
-        ranged = ";" in attitude
-        region["attitude"] = (
-            _ends("--attitude", attitude, "roll pitch yaw") if ranged else numbers("--attitude", attitude, 3).tolist()
-        )
+        one = None if ";" in attitude else numbers("--attitude", attitude, 3).tolist()
+        region["attitude"] = one or _ends("--attitude", attitude, "roll pitch yaw")
     if lengths is not None:
         region["lengths"] = dict(zip(("min", "max"), numbers("--lengths", lengths, 2).tolist(), strict=True))
     return region

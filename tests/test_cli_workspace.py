@@ -147,7 +147,7 @@ def test_too_few_cables_report_why_and_what_to_request(tmp_path):
 def test_cables_of_constant_length_do_not_let_the_platform_go(tmp_path):
     """With its quadrotors at home, flycrane can be only where its cables have their lengths: at home."""
     done = run("flycrane", "--samples", "50", cwd=tmp_path)
-    assert "  note: static-equilibrium allows any cable lengths, but they are constant; see " in done.stdout
+    assert "  note: the condition allows any cable lengths, but they are constant; see " in done.stdout
     told = json.loads(run("wang-flying", "--samples", "50", "--json", cwd=tmp_path).stdout)
     assert told["note"] is None
 
