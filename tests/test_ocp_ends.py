@@ -503,3 +503,17 @@ def test_in_all_of_the_tube_cables_lack_at_least_the_bound_of_a_cycle(strength, 
         assert cycle.shortfall(directions)[0] * weight <= least.mean() + momentum
         if not trial % 2:  # the platform may be anywhere most of the time
             assert at_any_time.shortfall(directions)[0] * weight <= least.min()
+
+
+def test_no_motion_leaves_a_zone_faster_than_its_speeds_let_it_at_each_distance():
+    """The time is the integral of ds over the bound, which rises by 10 1/s outside."""
+    zone = {"centre": [0, 0, 1], "radius": 0.1, "speed": 0.05}
+    s = (np.arange(40_000) + 0.5) * 1e-5
+    seconds = float(np.sum(1e-5 / (0.05 + 10 * np.maximum(s - 0.1, 0))))
+    path = {"kind": "line", "start": [0, 0, 1], "end": [0.4, 0, 1]}
+    task = {"path": path, "tube": {"position": "free"}, "limits": {"zone_speed": [zone]}}
+    found = plan("point-mass-3", task | {"duration": 0.9 * seconds})
+    assert found.status == "infeasible"
+    assert [excess.limit for excess in found.audit.excess] == ["zone_speed"]
+    assert found.audit.excess[0].value == pytest.approx(0.05 / 0.9, rel=1e-6)
+    assert plan("point-mass-3", task | {"duration": 1.3 * seconds}).feasible

@@ -258,6 +258,22 @@ def test_formations_keep_the_balance_of_a_load():
     np.testing.assert_allclose((weights @ cables[unclipped])[:, :2], 0, atol=1e-12)
 
 
+def test_a_load_all_the_way_hangs_on_a_path_as_the_weight_of_a_heavier_platform_does():
+    def laid(robot, more):
+        return lay_out(robot, Task.model_validate({"steps": 20, "tube": {"position": "free"}} | more))
+
+    carry = {"name": "carry", "duration": 2, "path": LINE, "load": {"mass": 7, "com": [0, 0, 0]}}
+    heavy = ROBOT.model_copy(update={"platform": ROBOT.platform.model_copy(update={"mass": ROBOT.platform.mass + 7})})
+    ours, theirs = laid(ROBOT, {"phases": [carry]}), laid(heavy, {"path": LINE, "duration": 2})
+    poses = np.zeros((300, 6))
+    poses[:, :3] = np.random.default_rng(0).uniform([-1.5, -1.5, -0.5], [1.5, 1.5, 2.5], (300, 3))
+    frame = np.zeros((300, len(ROBOT.carriers), 6))
+    kept, others = (AtRest(each, 1.0, spare=0.0)(poses, frame) for each in (ours, theirs))
+    assert 0 < (others.worst == -1).sum() < 300
+    np.testing.assert_array_equal(kept.slack, others.slack)
+    assert is_open(ours)
+
+
 def test_places_on_the_axis_of_a_swivelling_pulley_are_not_tried():
     # There the pulley has no direction, and a point mass is often sampled there: at the edge of the anchors' box.
     pulley = {"pulley": {"radius": 0.05, "axis": [0, 0, 1]}}

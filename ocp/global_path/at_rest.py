@@ -10,6 +10,7 @@ from ...solvers import solve_batch
 from ..audits.tensions import few_and_inverse, scaled
 from ..limits import Limit, Rate
 from ..nlp.guess import with_tilts
+from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 
 UNKNOWN = 2.0  # metres by which a limit may change while what moves moves by one, if the limit does not state it
@@ -87,11 +88,11 @@ class AtRest:
 
     @cached_property
     def _weight(self) -> np.ndarray | None:
-        """Return the wrench at rest (6,) in newtons, which no pose changes; None with wind, which turns with it."""
-        scenario, still = self.scenario, np.zeros(6)
-        if scenario.wind is not None and any(scenario.wind):
+        """Return the wrench at rest (6,) in newtons, which no pose changes; None where it turns with it."""
+        scenario, home = self.scenario, self.scenario.robot.home
+        if scenario.phases.carry or (scenario.wind is not None and any(scenario.wind)):
             return None
-        return scaled(scenario, scenario.dynamics.required_wrench(scenario.robot.home, still, still)[None])[0]
+        return scaled(scenario, scenario.dynamics.required_wrench(home, *np.zeros((2, 6)))[None])[0]
 
     def _balance(
         self, platform: np.ndarray, carriers: np.ndarray
@@ -107,8 +108,8 @@ class AtRest:
         if self._weight is not None:
             w = np.broadcast_to(self._weight, platform.shape)
         else:
-            still = np.zeros_like(platform)
-            w = scaled(scenario, scenario.dynamics.required_wrench(platform, still, still, wind=scenario.wind))
+            still = Motion(platform, *np.zeros((2, *platform.shape)))
+            w = scaled(scenario, scenario.required_wrench(np.zeros(len(platform)), still, wind=scenario.wind))
         few, inverse = few_and_inverse(A, len(robot.platform.dof))
         tensions = np.clip((inverse @ w[..., None])[..., 0], *self._bounds)
         missed = np.linalg.norm((A @ tensions[..., None])[..., 0] - w, axis=1)

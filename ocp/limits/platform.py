@@ -37,8 +37,18 @@ class ZoneSpeed(Magnitude):
 
     def bound(self, positions: np.ndarray) -> np.ndarray:
         """Return the largest speed at positions (n, 3) [m], (n,) [m/s]."""
-        outside = np.linalg.norm(positions - self._centre, axis=1) - self._radius
-        return self.high + STEEPNESS * np.maximum(outside, 0.0)
+        return self.high + STEEPNESS * np.maximum(self._outside(positions)[:, 0], 0.0)
+
+    def way(self, positions: np.ndarray) -> np.ndarray:
+        """Return how far positions (..., 3) are from the centre, in metres inside the zone, (..., 1).
+
+        A metre outside counts for less, as the bound rises: no motion that keeps the limit changes this any faster.
+        """
+        outside, slow = self._outside(positions), self.high / STEEPNESS
+        return self._radius + np.where(outside < 0, outside, slow * np.log1p(np.maximum(outside, 0.0) / slow))
+
+    def _outside(self, positions: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(positions - self._centre, axis=-1, keepdims=True) - self._radius
 
     def values(self, state: State) -> ca.SX:
         from_centre = ca.sumsqr(state.platform.position - ca.DM(self._centre)) / self._radius**2

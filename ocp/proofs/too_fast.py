@@ -16,7 +16,7 @@ from ..audits.excess import Excess
 from ..limits import Limit
 from ..limits.cables import CableSpeed
 from ..limits.carriers import CarrierAcceleration, CarrierSpeed
-from ..limits.platform import PlatformAcceleration, PlatformSpeed
+from ..limits.platform import PlatformAcceleration, PlatformSpeed, ZoneSpeed
 from ..tasks.scenario import Scenario
 from .too_weak_carriers import OF_DURATION, carriers_of, strongest
 
@@ -52,6 +52,8 @@ def too_fast(
         x, off = places[body, :, None, :3], (spread[body] if body else of_origin)[:, None]
         if isinstance(limit, PlatformSpeed | CarrierSpeed):
             yield from _mean_rate(limit, times, x, off)
+        elif isinstance(limit, ZoneSpeed):
+            yield from _mean_rate(limit, times, limit.way(x), off)
         elif isinstance(limit, CableSpeed):
             if lengths is None:
                 poses = places[0], places[1:].swapaxes(0, 1)
