@@ -281,9 +281,10 @@ def _forces(
     """
     rows = np.flatnonzero(robot.dof_mask)
     scale = robot.wrench_scale[rows]
-    A, tensions, missing = _of_plan(robot, trajectory, planned, carriers)
+    end = trajectory.duration or 0.0
+    A, tensions, missing = _of_plan(robot, trajectory, end + np.minimum(after, 0.0), planned, carriers)
     if (beyond := after[:, None] > 0).any():
-        last = _of_plan(robot, trajectory, *trajectory.at(before(trajectory.duration or 0.0)))
+        last = _of_plan(robot, trajectory, before(end), *trajectory.at(before(end)))
         value, *rates = slopes(np.log(np.maximum(last[1], SLACK * robot.t_max)))  # so that all tensions stay positive
         rates = [np.clip(rate, -most, most) for rate, most in zip(rates, MOST_FADING, strict=True)]
         tensions = np.where(beyond, np.exp(faded((value, *rates), np.maximum(after, 0.0))[0]), tensions)
@@ -303,16 +304,22 @@ def _forces(
 
 
 def _of_plan(
-    robot: Robot, trajectory: Trajectory, planned: Motion, carriers: Motion
+    robot: Robot, trajectory: Trajectory, times: np.ndarray, planned: Motion, carriers: Motion
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return wrench matrices (n, 6, m), the tensions that balance a plan best, (n, m), and missing wrenches (n, 6)."""
+    """Return wrench matrices (n, 6, m), the tensions that balance a plan best, (n, m), and missing wrenches (n, 6).
+
+    If several tensions balance it, they are those nearest to the plan's, for which its carriers tilt.
+    """
     dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
     scale = robot.wrench_scale[rows]
     A = dynamics.wrench_matrix(planned[0], carriers[0])
     w = dynamics.required_wrench(*planned, wind=trajectory.wind)
     along = A[:, rows] * scale[:, None]
     transposed = along.swapaxes(1, 2)
-    tensions = _least(transposed @ along, transposed @ (scale * w[:, rows])[..., None])
+    near = np.zeros((len(w), robot.m, 1))
+    if robot.m > len(rows) and trajectory.tensions is not None:
+        near = np.nan_to_num(trajectory.tensions(times))[..., None]
+    tensions = near + _least(transposed @ along, transposed @ ((scale * w[:, rows])[..., None] - along @ near))
     return A, tensions[..., 0], w - (A @ tensions)[..., 0]
 
 

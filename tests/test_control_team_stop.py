@@ -230,6 +230,30 @@ def test_carriers_with_two_cables_keep_the_path_of_their_hooks():
     assert flown.error.max() < 1e-3
 
 
+def test_a_team_with_more_cables_than_it_needs_keeps_the_tensions_of_its_plan():
+    """Eight cables on three quadrotors, which tilt for the planned tensions: others give forces across the thrust."""
+    data = load("flycrane").model_dump(mode="json")
+    corners = [cable["attachment"] for cable in data["cables"]]
+    data["cables"] += [{**data["cables"][k], "attachment": corners[j], "length": None} for k, j in ((0, 2), (2, 0))]
+    robot = Robot.model_validate(data)
+    dynamics, carriers = Dynamics(robot), robot.carrier_home.copy()
+    A, w = dynamics.wrench_matrix(robot.home, carriers), dynamics.required_wrench(robot.home, *np.zeros((2, 6)))
+    tensions = np.linalg.lstsq(A, w - A @ (near := np.full(robot.m, 6.0)))[0] + near
+    for k, carrier in enumerate(robot.carriers):
+        pull = -(A[:3] @ (tensions * (robot.carrier_of_cable == k)))
+        tilts = carrier.balanced_tilt(carriers[[k]], np.zeros((1, 6)), pull[None], np.array(robot.gravity))
+        carriers[k, 3:5] = tilts[0]
+
+    def at(times):
+        poses = [np.repeat(each[None], len(times), axis=0) for each in (robot.home, carriers)]
+        return tuple((pose, 0 * pose, 0 * pose) for pose in poses)
+
+    rest = Trajectory(0.05, at, lambda times: np.tile(tensions, (len(times), 1)))
+    its = team_stop_along(robot, rest, 0.0)
+    assert (its.excess, its.limit) == (0.0, "")
+    np.testing.assert_allclose(its.tensions, np.tile(tensions, (len(its.times), 1)), atol=1e-6)
+
+
 def test_what_is_no_such_team_is_refused_in_one_line():
     line = {"path": {"kind": "line", "start": [0, 0, 0], "end": [0.1, 0, 0]}, "duration": 2.0}
     robot = load("wang-flying-quadrotor")
