@@ -338,8 +338,8 @@ def test_methods_that_claim_continuity_do_not_jump(method):
 
 
 def test_the_continuity_test_can_see():
-    """Check that linear programs jump as the cables turn; one of twenty motions shows it."""
-    assert continuity("1-norm", range(20)).worst > 0.3
+    """Check that linear programs jump as the cables turn; of the first twenty motions, two show it."""
+    assert continuity("1-norm", range(8, 9)).worst > 0.3
 
 
 @pytest.mark.parametrize("options", [{}, {"rho": 1.0}])

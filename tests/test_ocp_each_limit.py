@@ -152,14 +152,14 @@ class Case:
 OUT = {  # out and back: what binds binds in the middle
     "path": {"kind": "waypoints", "points": [[0, 0, 1], [0.5, 0.3, 1.3, 0.2, 0.1, 0.3], [0, 0, 1]]},
     "duration": 1.5,
-    "steps": 30,
+    "steps": 20,
     "tube": {"position": "free", "attitude": "free", "ends": "exact"},
     "objective": {"deviation": 0.1, "jerk": 100},
 }
 HOME = load("ipanema-2").home
 TURN = OUT | {"path": {"kind": "waypoints", "points": [[*HOME], [*HOME[:5], 0.4], [*HOME]]}}
 CIRCLE = {"kind": "circle", "centre": [0, 0, -1], "radius": 0.6, "rate": 0.2 * np.pi}
-BASE = {"path": CIRCLE, "base": {"kind": "free", "ends": "periodic"}, "steps": 40}
+BASE = {"path": CIRCLE, "base": {"kind": "free", "ends": "periodic"}, "steps": 24}
 TOWED = {
     "path": {"kind": "line", "start": [1.2, 0.9, 0.3], "end": [1.3, 1.0, 0.5]},
     "duration": 2,
@@ -218,7 +218,7 @@ CASES = {
     ),
     "cable_acceleration": Case(
         "ipanema-1",
-        OUT,
+        OUT | {"steps": 30},  # fewer were refined
         lambda p: np.abs(rate(p, rate(p, lengths(p)))[3:-3]),
         lambda b: {"cable_acceleration": b},
         tolerance=5e-3,

@@ -66,7 +66,6 @@ CASES = [
     ("wang-ctmrts-4", "fixed-length", "effort", 25),
     ("wang-ctmrts-4", "variable-length", "time", 12),
     ("wang-ctmrts-5", "both", "effort", 25),
-    ("wang-ctmrts-6", "both", "effort", 25),
 ]
 
 

@@ -40,9 +40,6 @@ def with_change(task, relaxed):
     return task | {"limits": limits | {field: bound}}
 
 
-PAST = {"shift of path.start", "shift of path.end", "length of a way round"}
-
-
 @pytest.mark.parametrize(
     ("limits", "offered"),
     [
@@ -104,9 +101,8 @@ class Low(Limit):
     [
         ({"platform_speed": 0.2}, {"duration", "limits.platform_speed"}),
         ({"platform_box": {"min": [-1, -1, 0], "max": [1, 1, 1.1]}}, {"limits.platform_box.max[2]"}),
-        ({"keep_out": [{**BALL, "centre": [0.25, 0.15, 1.15], "platform": 0.2, "cables": None}]}, PAST),
     ],
-    ids=["speed", "end", "inside"],
+    ids=["speed", "end"],
 )
 def test_a_motion_in_a_tube_is_offered_what_it_needs(limits, offered):
     task = TASK | {"tube": {"position": 0.02}, "steps": 20, "limits": limits}
@@ -115,8 +111,7 @@ def test_a_motion_in_a_tube_is_offered_what_it_needs(limits, offered):
     assert {relaxed.name for relaxed in planned.relaxations} == offered
     for relaxed in planned.relaxations:
         assert relaxed.plan.audit.passed
-        varied = relaxed.plan.scenario.task.model_dump() if offered is PAST else with_change(task, relaxed)
-        assert plan(ROBOT, varied).feasible
+        assert plan(ROBOT, with_change(task, relaxed)).feasible
 
 
 def test_no_longer_duration_is_tried_where_an_end_is_in_the_way(monkeypatch):
@@ -144,7 +139,7 @@ def test_tension_rates_of_more_cables_than_needed_are_offered_by_their_least():
 def test_a_plan_without_a_solution_can_be_sent_to_another_process_with_its_relaxations():
     """Pickle a plan whose relaxations are not computed yet: what computes them holds programs, which no pickle has."""
     task = TASK | {"tube": {"position": 0.02}, "steps": 8, "limits": {"tension_rate": 3}}
-    planned = plan(ROBOT, task)
+    planned = plan("planar-4", task | {"path": {"kind": "line", "start": [0, 0, 1], "end": [0.3, 0, 1.1]}})
     assert planned.status is MotionStatus.NOT_FOUND
     sent = pickle.loads(pickle.dumps(planned))
     assert [relaxed.to_dict() for relaxed in sent.relaxations] == [each.to_dict() for each in planned.relaxations]

@@ -23,6 +23,7 @@ import towline
 from towline import Requirements, Robot, Task
 from towline.cli.main import app
 from towline.estimation.logs.mapping import LogMap
+from towline.figures import style
 from towline.layout import search
 from towline.models import carriers
 from towline.models.parsing import json_schema, parse_yaml
@@ -87,12 +88,18 @@ def split(line):
     return [quoted or plain for quoted, plain in re.findall(r'"([^"]*)"|(\S+)', line)][1:]
 
 
+def print_nothing(canvas, form, file, dpi, metadata):
+    """Leave an empty picture for a figure that has been drawn, of which printing takes most of the time."""
+    file.write("<svg/>") if hasattr(file, "write") else file.write_bytes(b"")
+
+
 def run_page(page, folder, monkeypatch):
     """Run the blocks of a page in a folder; return the names that its Python defined."""
     monkeypatch.chdir(folder)
     monkeypatch.setenv("CFLAGS", "-O0")  # of exported units: it changes no bit
     monkeypatch.setattr(search, "_SEARCHING", 0.0)  # of longer searches and larger audits, test_design.py has tests
     monkeypatch.setattr(search, "AUDITED", 10_000)
+    monkeypatch.setattr(style, "_print", print_nothing)  # test_figures.py has tests of what is printed
     monkeypatch.setattr(carriers, "_KINDS", dict(carriers._KINDS))  # other tests know nothing of a page's own carrier
     namespace = {"__name__": "example"}
     for block in blocks(page):

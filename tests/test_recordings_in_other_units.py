@@ -268,8 +268,7 @@ def test_the_take_of_a_motion_capture_in_mm_with_y_up(tmp_path):
     np.testing.assert_allclose(rotation, turns[: len(position)].as_matrix(), atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["theta_deg", "heading [deg]"])
-def test_the_angle_of_a_planar_robot_with_z_down(name, tmp_path):
+def test_the_angle_of_a_planar_robot_with_z_down(tmp_path):
     """It is the only one, whatever its name; a scale of 2 % hides neither the sign of z nor that of the angle."""
     robot, _ = user.planar(tmp_path)
     built, t = load(robot), np.arange(0, 12, 0.05)
@@ -280,7 +279,7 @@ def test_the_angle_of_a_planar_robot_with_z_down(name, tmp_path):
     rotation = Rotation.from_rotvec(np.outer(turns, [0, 1, 0])).as_matrix()
     y = user.lengths_at(built.anchors, attachments, places, rotation) / 1.02
     rows = np.column_stack([t, y, places[:, 0], -places[:, 2], np.degrees(turns)])
-    path = user.write(tmp_path / "log.csv", ["t", "l1", "l2", "l3", "l4", "x", "z", name], rows)
+    path = user.write(tmp_path / "log.csv", ["t", "l1", "l2", "l3", "l4", "x", "z", "heading [deg]"], rows)
     found = mistake(built, read_measurements(path, robot=built))
     assert found.text.startswith("z of the positions seems to have the wrong sign")
     np.testing.assert_allclose(

@@ -323,14 +323,14 @@ def test_carriers_that_tilt_tell_so_and_obstacles_are_in_the_film(tmp_path):
 
 def test_gif_has_the_frames_that_were_asked_for(free, tmp_path):
     start = time.process_time()
-    file = free.animate(tmp_path / "circle.gif", speed=2)
+    file = free.animate(tmp_path / "circle.gif", speed=4)
     assert time.process_time() - start < 30
     with Image.open(file) as picture:
-        assert picture.n_frames == 101  # 10 s at 20 frames a second and twice the speed, both ends
+        assert picture.n_frames == 51  # 10 s at 20 frames a second and four times the speed, both ends
         assert picture.info["duration"] == 50
         assert picture.size == (700, 520)
         frames = []
-        for k in (0, 25, 50):
+        for k in (0, 12, 25):
             picture.seek(k)
             frames.append(np.asarray(picture.convert("RGB")))
     assert (frames[0] != frames[1]).any()
@@ -344,8 +344,8 @@ def test_gif_keeps_the_speed_though_it_counts_in_hundredths(impossible, tmp_path
     when = animation.timing(tmp_path / "x.gif", 1.0, speed=0.5, fps=30)
     assert when.rate == pytest.approx(100 / 3)
     np.testing.assert_allclose(np.diff(when.times), 0.015)
-    with Image.open(impossible.animate(tmp_path / "x.gif", speed=0.5, fps=30)) as picture:
-        assert picture.n_frames == 67
+    with Image.open(impossible.animate(tmp_path / "x.gif", speed=2, fps=30)) as picture:
+        assert picture.n_frames == 17
         assert picture.info["duration"] == 30
 
 

@@ -22,7 +22,7 @@ SCRIPT = """\
 from towline import load, simulate
 
 if __name__ == "__main__":
-    simulate("wang-flying", load("wang-flying").home, wind=(3, 2, 0.5), gusts=1.0, duration=0.03, seed=5, runs=1000,
+    simulate("wang-flying", load("wang-flying").home, wind=(3, 2, 0.5), gusts=1.0, duration=0.03, seed=5, runs=400,
              checkpoint="flights", resume=True, progress=lambda *done: print(*done, flush=True))
 """
 
@@ -57,7 +57,7 @@ def test_killed_and_resumed_they_are_the_same(tmp_path, monkeypatch):
     monkeypatch.setattr(simulation_runs, "fly_part", counted)
     resumed = fly(tmp_path / "flights", runs)
     assert 0 < stored <= runs - sum(flown)
-    alone = simulate("wang-flying", load("wang-flying").home, **GIVEN, runs=1000)
+    alone = simulate("wang-flying", load("wang-flying").home, **GIVEN, runs=400)
     files = [save(table, tmp_path / name).read_bytes() for table, name in ((resumed, "a.nc"), (alone, "b.nc"))]
     assert files[0] == files[1]
 

@@ -20,12 +20,12 @@ def shell(command, folder):
     return subprocess.run(["bash", "-c", line], cwd=folder, capture_output=True, text=True, timeout=120, check=False)
 
 
-@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("closed", ["2>&-", "<&- >&- 2>&-"])
 def test_closed_streams_are_those_of_nobody(closed, tmp_path):
     (tmp_path / "rest.yaml").write_text(TASK)
     done = shell(f"towline plan wang-flying rest.yaml --out plan.nc {closed}", tmp_path)
     assert done.returncode == 0, done.stderr
-    assert ("FEASIBLE" in done.stdout) == (">&-" not in closed.replace("2>&-", ""))
+    assert ("FEASIBLE" in done.stdout) == (closed == "2>&-")
     assert done.stderr == ""
     assert (tmp_path / "plan.nc").read_bytes().startswith(b"\x89HDF")
     assert shell(f"towline robots nothing {closed}", tmp_path).returncode == 2
@@ -35,10 +35,8 @@ def test_closed_streams_are_those_of_nobody(closed, tmp_path):
     ("command", "code"),
     [
         ("towline robots | true", 141),
-        ("towline robots --json | true", 141),
         ("towline robots | cat", 0),
         ("towline robots nothing | true", 2),
-        ("towline robots nothing 2>&1 | true", 2),
         ("towline tension wang-flying --pose '0.6 0 -1 0 0 0' | cat", 1),
         ("towline tension wang-flying --pose '0.6 0 -1 0 0 0' | true", 141),
     ],
