@@ -192,9 +192,7 @@ def _condition(texts: list[str] | None) -> Condition:
                     f"({error.msg}, character {error.pos + 1})"
                 ) from None
         conditions.append(condition_from(data))
-    if not conditions:
-        return StaticEquilibrium()
-    return conditions[0] if len(conditions) == 1 else AllOf(conditions=tuple(conditions))
+    return AllOf(conditions=tuple(conditions)) if len(conditions) > 1 else (conditions or [StaticEquilibrium()])[0]
 
 
 def _region(box: str | None, attitude: str | None, carriers: str, lengths: str | None) -> dict[str, Any]:
@@ -258,8 +256,7 @@ def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None, remar
     typer.echo(f"  {size_of} {quantity(summary['volume'], unit, digits=6)}{about}")
     if "cell_edges" in result:
         longest = float(result["cell_edges"].max())
-        larger = size is not None and longest > size * (1 + 1e-9)
-        more = f", not {size:g} m, which takes more samples" if larger else ""
+        more = f", not {size:g} m, which takes more samples" if size and longest > size * (1 + 1e-9) else ""
         typer.echo(f"  edges of the smallest cells up to {quantity(longest, 'm', digits=3)}{more}")
     if accepted:
         for name, ends in summary["bounds"].items():

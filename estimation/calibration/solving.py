@@ -161,9 +161,7 @@ def _determined(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
         far = values > max(limit, shown)
         if away[far] @ away[far] <= limit:
             break  # about where the file has them
-        loose = np.zeros((len(seen.covariance), int(far.sum())))
-        loose[lengths] = vectors[:, far]
-        kept, state = keeping(model, result.state, loose)
+        kept, state = keeping(model, result.state, np.eye(len(seen.covariance))[:, lengths] @ vectors[:, far])
         found, scale = fit(kept, state, length), metric(model)
         before, after = (np.linalg.norm((one.state.x - of.first) * scale) for one in (result, found))
         if after > before or not found.converged or (of.table(found.state.x)[:, 8] < 0).any():
