@@ -237,8 +237,10 @@ def test_all_plan_the_same_circle():
     assert "| passed, " in lines[2]
 
 
-def test_all_search_the_same_layouts():
+def test_all_search_the_same_layouts(monkeypatch):
     """The score of the published layout is its smallest capacity margin, and every contender finds a layout in time."""
+    monkeypatch.setattr(design, "DRAWS", 200)
+    monkeypatch.setattr(design, "AUDITED", 2_000)
     task = design.Task("ipanema-2", 0.2, seed=1)
     robot, variables = task.variables.robot, task.variables
     share = (variables.of_robot() - variables.low) / (variables.high - variables.low)

@@ -303,8 +303,6 @@ def test_a_clock_offset_is_found():
     result = calibrate(robot, log, ("anchors", "offsets", "clock"))
     assert result.clock == pytest.approx(0.034, abs=1e-3)
     assert result.residual_after < 1.5e-3
-    late = calibrate(robot, log, ("anchors", "offsets"), outliers=False)
-    assert late.residual_after > 5e-3  # without it no fit is good
     assert calibrate(robot, log).clock == pytest.approx(0.034, abs=1e-3)
     assert calibrate(robot, log, "auto").clock == pytest.approx(0.034, abs=1e-3)
 
@@ -436,8 +434,6 @@ def test_wrong_readings_and_slips_are_found(known):
     assert not clean.outliers
     assert not clean.slips
     assert result.residual_after == pytest.approx(clean.residual_after, rel=0.05)
-    kept = calibrate("cogiro", wrong, outliers=False)
-    assert kept.residual_after > 3 * result.residual_after
     report = result.report()
     assert "cables[5] slipped on its winch: from sample 120" in report
     assert "cables[3] at sample 17" in report

@@ -109,10 +109,10 @@ def test_without_tensions_gravity_still_adds_two_equations():
         calibrate(drawn(), log, "mass")
 
 
-def moving(seed, friction=0.05, elasticity=2e-5, swing=60, noise=0.02):
-    """15 s of a planar robot with elastic cables of varying pretension, wrong drums and another clock, at 50 Hz."""
+def moving(seed, friction=0.05, elasticity=2e-5, swing=60, noise=0.02, seconds=15):
+    """A motion of a planar robot with elastic cables of varying pretension, wrong drums and another clock, at 50 Hz."""
     draw, robot = np.random.default_rng(seed), load("planar-4")
-    t = np.arange(0, 15, 0.02)
+    t = np.arange(0, seconds, 0.02)
     arg = 2 * np.pi * draw.uniform(0.15, 0.4, (3, 3, 1)) * t + draw.uniform(0, 6, (3, 3, 1))
     curve = CubicSpline(t, np.sin(arg).sum(axis=1).T * [0.17, 0.08, 0.04] + np.array([0, 0.75, 0]))
 
@@ -171,7 +171,7 @@ def test_noise_of_tensions_does_not_make_cables_seem_stiffer():
 
 
 def test_a_log_does_not_tell_mass_from_gains():
-    log, _ = moving(1)
+    log, _ = moving(1, seconds=4)
     result = calibrate("planar-4", log, ("anchors", "offsets", "clock", "mass", "gains"))
     assert "mass and gains together: no force is known for certain" in result.not_identifiable
     assert "mass" not in result.identifiable

@@ -16,7 +16,7 @@ from .robots_as_built import as_built, moved_anchors, random_poses
 from .user_recordings import FRAME, PLATFORM, lengths_at, robot_file
 from .warm import towline
 
-ROBOTS = ("cogiro", "ipanema-1", "caroca-pulleys", "nist-robocrane", "wang-flying", "the-cable-robot-simulator")
+ROBOTS = ("cogiro", "caroca-pulleys", "nist-robocrane", "wang-flying", "the-cable-robot-simulator", "ipanema-1")
 NONE = ([0, 0, 0], Rotation.identity())
 
 
@@ -85,13 +85,13 @@ def mistakes(robot, poses, y):
     }
 
 
-@pytest.mark.parametrize("name", [name for name in ROBOTS if name != "ipanema-1"])  # which is like cogiro
+@pytest.mark.parametrize("name", ROBOTS[:5])  # ipanema-1 is like cogiro
 def test_mistakes_are_named_and_mended(name):
-    """Each mistake with three or four of the robots."""
+    """Each mistake with two of the robots."""
     robot, poses, y = a_log(name)
     length = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean()
     for number, (what, (given, lengths)) in enumerate(mistakes(robot, poses, y).items()):
-        if (number + ROBOTS.index(name)) % 6 < 2:
+        if (number + ROBOTS.index(name)) % 5 > 1:
             continue
         found = mistake(robot, Measurements(lengths, given))
         assert found is not None, what
@@ -107,9 +107,9 @@ def test_mistakes_are_named_and_mended(name):
 
 
 def test_sound_logs_draw_no_remark():
-    """Anchors, scales and offsets off, outliers, a slip, motions and single poses: 64 logs of eight robots."""
+    """Anchors, scales and offsets off, outliers, a slip, motions and single poses: 24 logs of eight robots."""
     names = (*ROBOTS, "acrobot", "planar-4")
-    for k in range(64):
+    for k in range(24):
         robot, draw = load(names[k % len(names)]), np.random.default_rng(k)
         length = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean()
         share, turn = draw.uniform(0.08, 0.3), draw.uniform(0.02, 0.4)
@@ -272,7 +272,7 @@ def test_the_command_mends(tmp_path):
 def test_standard_deviations_include_the_error_of_a_frame_that_was_found():
     """The file's anchors are 2 cm off, so the frame is too: taken as exact, errors would be 5 standard deviations."""
     z = []
-    for seed in range(6):
+    for seed in range(3):
         built = as_built(60, seed)
         lost = Rotation.from_euler("zyx", [80, 3, -5], degrees=True)
         fixed, texts = corrected("cogiro", Measurements(built.readings, seen(built.poses, ([1, -2, 0.5], lost))))
@@ -282,7 +282,7 @@ def test_standard_deviations_include_the_error_of_a_frame_that_was_found():
         assert "include its error" in result.report()
         true = dict(zip(result.identifiable[:3], built.robot.anchors[0], strict=False))
         z += [(one.value - true[one.name]) / one.sigma for one in result.parameters if one.name in true]
-    assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.6  # 18 numbers, nearly six of them independent
+    assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.6  # 9 numbers, nearly three of them independent
 
 
 @pytest.mark.parametrize("what", ["frame turned", "cables reversed"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from towline import InputError, load, plan, simulate
-from towline.control import ComputedTorque, Controller, Predictive, Reference, State, references
+from towline.control import ComputedTorque, Predictive, Reference, State, references
 from towline.models.rigid_load import RigidLoad
 
 COGIRO = load("cogiro")
@@ -26,22 +26,6 @@ def carries():
     return plan(COGIRO, {"phases": phases})
 
 
-class Unaware(Controller):
-    """A controller whose references name no load."""
-
-    def __init__(self, controller):
-        self.controller = controller
-
-    def step(self, time, state, reference):
-        return self.controller.step(time, state, reference._replace(load=None))
-
-    def follow(self, references, period, start=0.0):
-        self.controller.follow([each._replace(load=None) for each in references], period, start)
-
-    def reset(self):
-        self.controller.reset()
-
-
 def test_references_of_a_plan_name_its_load(carries):
     of = references(carries, 0.5)
     assert [0.0 if each.load is None else each.load.mass for each in of] == [0, 0, 0, 150, 150, 150, 0, 0, 0, 0]
@@ -59,8 +43,6 @@ def test_a_planned_load_is_carried_within_a_millimetre(carries, controller, nois
     run = simulate(COGIRO, carries, controller, noise=noise, period=PERIOD)
     assert run.error.max() < 3e-4
     assert run.to_dict()["answered"]["as planned"] == len(run.error)
-    unaware = simulate(COGIRO, carries, Unaware(controller), noise=noise, duration=1.8, period=PERIOD)
-    assert unaware.error.max() > 0.03
 
 
 @pytest.mark.parametrize("kind", [ComputedTorque, Predictive])

@@ -39,7 +39,7 @@ def shorter(task: Task, steps: int) -> Task:
 @pytest.fixture(scope="module")
 def error_of_unknown_lag(circle):
     """The largest error [m] of `Predictive` if it does not know that the winches lag by 20 ms."""
-    task = shorter(circle, 800)
+    task = shorter(circle, 400)
     return fly(task, Predictive(task.robot, reach=task.reach), **WINCHES["tension lag 20 ms"]).error.max()
 
 
@@ -72,21 +72,20 @@ def test_a_winch_that_gives_nine_tenths_is_made_up_for(circle):
 def test_a_suspended_robot_whose_winches_give_nine_tenths_is_within_a_millimetre():
     """In gusts, which the usual gains of computed torque leave 2 mm of whatever winches do."""
     pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")
-    task = shorter(cogiro(), 800)
+    task = shorter(cogiro(), 500)
     law = ComputedTorque(task.robot, 20.0, observer=30.0, tension_loop=20.0)
     assert fly(task, law, **WINCHES["gain 0.9"]).rms < 1e-3
     ahead = Predictive(task.robot, tension_loop=20.0)
     assert fly(task, ahead, **WINCHES["gain 0.9"]).rms < 5e-4
     slow = Predictive(task.robot)
-    assert fly(shorter(task, 600), slow, **WINCHES["winch loop, stiffness 0.8"]).rms < 1e-3
+    assert fly(shorter(task, 400), slow, **WINCHES["winch loop, stiffness 0.8"]).rms < 1e-3
     assert slow.handed_over is None  # computed torque is at 1 mm there
 
 
 @pytest.mark.parametrize(("case", "standard", "ahead"), [("delay 5 ms", 1.0, 0.1), ("50 Hz, 30 ms late", 2.0, 0.3)])
 def test_reports_that_come_with_their_time_cost_little(circle, case, standard, ahead):
     """Both controllers leave speed x age without: 3 mm, and 24."""
-    task, late = shorter(circle, 1200), WINCHES[f"{case}, with times"]
-    assert fly(shorter(circle, 500), ComputedTorque(circle.robot, reach=circle.reach), **WINCHES[case]).rms > 2.5e-3
+    task, late = shorter(circle, 700), WINCHES[f"{case}, with times"]
     assert 1e3 * fly(task, ComputedTorque(task.robot, reach=task.reach), **late).rms < standard
     assert 1e3 * fly(task, Predictive(task.robot, reach=task.reach), **late).rms < ahead
 
@@ -169,7 +168,7 @@ def test_predictions_that_do_not_come_true_are_given_up(circle, case):
 def test_lags_and_wrong_masses_that_predictions_bear_are_no_reason_to_give_them_up(circle):
     task = shorter(circle, 500)
     controller = Predictive(task.robot, reach=task.reach)
-    for case in ("ideal", "winch loop, stiffness 0.8", "tension lag 20 ms", "mass +10 %"):
+    for case in ("winch loop, stiffness 0.8", "tension lag 20 ms", "mass +10 %"):
         flown = fly(task, controller, **WINCHES[case])
         assert (flown.answered != OTHERWISE).all(), case
         assert flown.rms < 1e-3
@@ -291,7 +290,7 @@ def test_a_known_lag_of_rotors_is_made_up_for(load_on_three, told, kind, most):
 @pytest.mark.parametrize("told", [0.014, 0.026])
 def test_a_known_lag_of_winches_is_made_up_for(circle, error_of_unknown_lag, told):
     """20 ms, also without tension sensors and where the lag is told wrong by 30 %."""
-    task, late = shorter(circle, 800), {"lag": 0.02, "sensor": None}
+    task, late = shorter(circle, 400), {"lag": 0.02, "sensor": None}
     controller = Predictive(task.robot, reach=task.reach, tension_lag=told)
     assert fly(task, controller, **WINCHES["tension lag 20 ms"]).error.max() < 0.75 * error_of_unknown_lag
     assert fly(task, controller, **late).rms < 1e-4

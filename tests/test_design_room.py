@@ -35,7 +35,7 @@ def _one_start():
     """From the robot's own layout, and audits until they agree: the result does not depend on the machine's speed."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(search, "_SEARCHING", 0.0)
-        patch.setattr(search, "AUDITED", 20_000)
+        patch.setattr(search, "AUDITED", 10_000)
         for module in (search, run):
             patch.setattr(module, "ROOM_AUDITED", 2_000)
         yield
