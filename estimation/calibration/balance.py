@@ -197,12 +197,17 @@ class Balance:
         inverse_root = np.linalg.inv(np.linalg.cholesky(M)) if finite else None
         return _Forces(record, poses, tensions, by_tensions, A, r, inner, variances, inverse_root, pull, motion.by_arm)
 
-    def masses(self, of: Parameters, x: np.ndarray, placed: tuple[np.ndarray, np.ndarray], clock: float) -> np.ndarray:
-        """Return the mass that the tensions carry at each sample [kg], (N,); arguments as for `at`."""
+    def masses(
+        self, of: Parameters, x: np.ndarray, placed: tuple[np.ndarray, np.ndarray], clock: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the mass that the tensions carry at each sample [kg], (N,), and what friction would add, (N, m).
+
+        That is the share of each tension with the sign of the cable's speed. Arguments as for `at`.
+        """
         forces = self._forces(of, x, placed, clock, 1.0)
-        return np.asarray(
-            x[of.clock + 1] - np.einsum("ni,ni->n", forces.r[:, :3], forces.pull) / (forces.pull**2).sum(1)
-        )
+        down = forces.pull / (forces.pull**2).sum(axis=1, keepdims=True)
+        masses = x[of.clock + 1] - np.einsum("ni,ni->n", forces.r[:, :3], down)
+        return masses, np.einsum("nim,ni->nm", forces.A[:, :3], down) * self._log.terms[0][0, self._chosen]
 
     def felt(self, table: np.ndarray, noise: float) -> FeltTensions:
         """Return the measured tensions, smoothed, with errors that make cables seem stiffer unless they are unknowns.
