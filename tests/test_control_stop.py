@@ -149,10 +149,9 @@ def test_where_the_planner_finds_only_a_much_slower_motion_the_fastest_law_is_sl
 WITHIN = {"path": {"kind": "line", "start": [-1, -0.5, 1], "end": [1, 0.5, 1.5]}, "stop_within": 0.25}
 
 
-@pytest.mark.parametrize("tube", [0, 0.02])
-def test_a_plan_is_as_fast_as_stops_in_time_permit(tube):
+def test_a_plan_is_as_fast_as_stops_in_time_permit():
     """Stops from instants between those of the check are in time, too; with a little less time they are not."""
-    task = {**WITHIN, "duration": {"min": 2.7, "max": 20}, "objective": {"time": 1}, "tube": {"position": tube}}
+    task = {**WITHIN, "duration": {"min": 2.7, "max": 20}, "objective": {"time": 1}, "tube": {"position": 0.02}}
     found = plan("cogiro", task)
     assert found.feasible
     assert found.stop.feasible
@@ -348,10 +347,10 @@ def test_a_stop_carries_the_load_of_its_phase(tmp_path):
         needed = dynamics.required_wrench(*halt.platform) + carries * dynamics.carried_wrench(*halt.platform, numbers)
         given = np.einsum("nij,nj->ni", dynamics.wrench_matrix(halt.platform[0]), halt.tensions)
         np.testing.assert_allclose(given, needed, atol=1e-5 * robot.weight)
-    halt = stop(found, 2.2)
+    halt, period = stop(found, 2.2), {"period": 2e-3}  # twice the default, in half of the time
     for run in (
-        simulate(robot, halt, Predictive(robot), duration=halt.duration + 0.3),
-        simulate(robot, found, Predictive(robot), events=["stop at 2.2"], duration=2.2 + halt.duration + 0.3),
+        simulate(robot, halt, Predictive(robot), duration=halt.duration + 0.3, **period),
+        simulate(robot, found, Predictive(robot), events=["stop at 2.2"], duration=2.5 + halt.duration, **period),
     ):
         assert run.passed
         loaded = run.record.tensions[-1] @ dynamics.wrench_matrix(run.record.motions[-1, 0, :6]).T
