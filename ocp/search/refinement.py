@@ -39,7 +39,7 @@ def refine(search: Search, outcome: Outcome) -> str:
     audit = search.audit(outcome)
     reserve, shrink = 0.0, 0.0
     for attempt in range(1, REFINEMENTS + 2):
-        outcome, audit, mesh = _tightened_again(search, outcome, audit, mesh)
+        outcome, audit, mesh, possible = _tightened_again(search, outcome, audit, mesh)
         solved_once = outcome.success or mesh.further
         if attempt > REFINEMENTS or audit.passed or not solved_once or search.seconds_left <= 0:
             break
@@ -49,7 +49,7 @@ def refine(search: Search, outcome: Outcome) -> str:
         reserve = min(reserve + RESERVE + missed, LARGEST_RESERVE)
         shrink = SHRINK * attempt if audit.excess else shrink
         further: Shares = ()
-        if outcome.success:  # else not again what had no solution
+        if outcome.success and possible:  # else not again what had no solution
             halved = tuple((name, about, share / 2) for name, about, share in mesh.further)
             further = _tightened(scenario, audit, halved)
         between = tuple(sorted({*mesh.between, *_missed_between(scenario, audit)}))
@@ -81,9 +81,12 @@ def _missed_between(scenario: Scenario, audit: Audit) -> set[str]:
     return names | ({TENSIONS} if parabolas and _missed(audit) else set())
 
 
-def _tightened_again(search: Search, outcome: Outcome, audit: Audit, mesh: Mesh) -> tuple[Outcome, Audit, Mesh]:
-    """Return a solution on the same mesh with limits that are tightened where the motion exceeds them a little."""
-    scenario, little = search.scenario, LITTLE
+def _tightened_again(search: Search, outcome: Outcome, audit: Audit, mesh: Mesh) -> tuple[Outcome, Audit, Mesh, bool]:
+    """Return a solution on the same mesh with limits that are tightened where the motion exceeds them a little.
+
+    Then whether the last program had a solution.
+    """
+    scenario, little, possible = search.scenario, LITTLE, True
     for _ in range(TIGHTENINGS):
         beyond = _beyond(scenario, audit)
         if not (outcome.success and search.seconds_left > 0 and 0.0 < beyond <= little):
@@ -93,10 +96,10 @@ def _tightened_again(search: Search, outcome: Outcome, audit: Audit, mesh: Mesh)
         search.tighten(mesh)
         guess = None if search.has_solution(mesh) else outcome.deviation
         again = search.solve("nonlinear program", mesh, guess, clear=True)
-        if not again.success:
+        if not (possible := again.success):
             break
         outcome, audit = again, search.audit(again)
-    return outcome, audit, mesh
+    return outcome, audit, mesh, possible
 
 
 def _times_finer(scenario: Scenario, audit: Audit) -> int:
