@@ -30,6 +30,9 @@ FORMS = {
     "dates": "time,l0,l1\n" + rows(clock("2024-05-17T{}Z")),
     "dates of another zone": "timestamp;l0;l1\n" + rows(clock("2024-05-17 {}+02:00", 14), ";"),
     "times of day": "Date,Time,l0,l1\n" + rows(clock("17.05.2024,{}")),
+    "times of day of 12 hours": "Timestamp;l0;l1\n" + rows(clock("5/17/2024 {} PM"), ";"),
+    "times of day past midnight": "Datum;Uhrzeit;l0;l1\n"
+    + rows((f"17.05.2024;{'23:59:59' if s < 1 else '00:00:00'}.{1000 * s % 1000:03.0f}" for s in T), ";"),
     "stamps of ROS 2": "header.stamp.sec,header.stamp.nanosec,l0,l1\n"
     + rows(f"{NOON + int(s)},{round(1e9 * (s % 1))}" for s in T),
     "stamps of ROS 1": "secs,nsecs,l0,l1\n" + rows(f"{NOON + int(s)},{round(1e9 * (s % 1))}" for s in T),
@@ -47,6 +50,7 @@ def test_forms_of_times_and_names(form, tmp_path):
     (tmp_path / "log.csv").write_text(FORMS[form])
     read = read_log(tmp_path / "log.csv")
     begin = 12 * 3600 if "of day" in form else 0  # from midnight, but not from 1970
+    begin = 86399 if "midnight" in form else begin
     np.testing.assert_allclose(read.measurements.times, begin + T, atol=1e-6)
     np.testing.assert_allclose(read.measurements.lengths, LENGTHS, rtol=1e-9)
     if "dates" in form or "stamps" in form:

@@ -21,13 +21,16 @@ LABVIEW = "***End_of_Header***"
 _ABOVE = r"(?:sampl[a-z]+ |frame )?(?:rate|frequency)[^\d\n]*|[a-z ]+[,;]*\r?\n"
 RATE = re.compile(rf"(?i)(?:^|\n)(?:{_ABOVE})(\d+(?:\.\d+)?)[.,;\s]*\n")
 PERIOD = re.compile(r"\nDelta_X\t+(\d+\.\d+)")  # [s] of LabVIEW
-TIME_OF_DAY = re.compile(rf"(?<![\d:]){_CLOCK}(?![\d:])")
+TIME_OF_DAY = re.compile(rf"(?<![\d:]){_CLOCK}(?![\d:])(?: ?([AaPp])[Mm])?")
+# A date as others write it, before a time of day or in a column of its own.
+OTHER_DATE = re.compile(rf"(?m)(?:^|(?<=[,;\t\"]))\d{{1,4}}([-./])\d\d?\1\d{{2,4}}(?: +(?={_CLOCK})|(?=[,;\t\"]))")
 
 
 def plain_csv(text: str) -> str:
     """Return CSV with one header, commas, semicolons or tabs between columns, decimal points, and times in seconds.
 
-    Dates count from 1970, in UTC unless they name another zone, and times of day from midnight.
+    Dates count from 1970, in UTC unless they name another zone. Times of day count from midnight, also beside dates of
+    other kinds.
     """
     text = f"#{text[1:]}" if text[:2] == "% " else text  # of MATLAB
     return _one_header(_with_points(_with_seconds(_with_tabs(text))))
@@ -54,7 +57,11 @@ def _with_seconds(text: str) -> str:
     begin = "\n".join(line for line in _head(text) if line[:1] != "#")
     if DATE.search(begin):
         text = DATE.sub(lambda found: _since_1970(found[0]), text)
-    return TIME_OF_DAY.sub(lambda found: _since_midnight(found[0]), text) if TIME_OF_DAY.search(begin) else text
+    if not TIME_OF_DAY.search(begin):
+        return text
+    if OTHER_DATE.search(begin):
+        text = OTHER_DATE.sub(lambda found: "" if found[0][-1] == " " else re.sub(r"\D", "", found[0]), text)
+    return TIME_OF_DAY.sub(_since_midnight, text)
 
 
 def _since_1970(date: str) -> str:
@@ -64,9 +71,10 @@ def _since_1970(date: str) -> str:
     return date
 
 
-def _since_midnight(time: str) -> str:
-    hours, minutes, seconds = time.split(":")
-    return f"{3600 * int(hours) + 60 * int(minutes) + float(seconds):.9g}"
+def _since_midnight(time: re.Match[str]) -> str:
+    hours, minutes, seconds = time[0].rstrip(" AaPpMm").split(":")
+    hour = int(hours) % 12 + 12 * (time[1] in "Pp") if time[1] else int(hours)
+    return f"{3600 * hour + 60 * int(minutes) + float(seconds):.9g}"
 
 
 def _with_points(text: str) -> str:

@@ -13,6 +13,7 @@ from .recording import GAP, Samples, Topic, check_rising, plain
 
 MOST_REPEATED = 0.2  # of the samples of a table, that may repeat a time
 FEWEST, STEADY = 20, 5.0  # samples, and how many times the usual step the longest one of a time may be
+DAY = 86400.0  # [s]
 MUCH_FASTER = 8  # times the rate, from which lines between samples suffice
 
 
@@ -58,7 +59,10 @@ class Reader:
                 column = values[:, self._of[key].index(clock.name)]
                 unit = clock.unit or self._unit_of(clock, column)
                 times = clock.factor * UNITS["time"][unit] * column
-                again = np.diff(times, prepend=np.nan) == 0
+                steps = np.diff(times, prepend=np.nan)
+                if np.nanmax(times, initial=0.0) < DAY:  # times of day, which begin again at midnight
+                    times = times + DAY * np.cumsum(steps < -0.5 * DAY)
+                again = steps == 0
                 if 0 < again.mean() <= MOST_REPEATED:
                     count = quantity(int(again.sum()))
                     self.notes.append(f"samples skipped because they repeat the time of the one before: {count}")
