@@ -83,8 +83,8 @@ def test_tensions_go_on_as_planned_or_as_measured(circle):
 
 def test_a_flight_goes_on_with_each_new_plan_without_a_jump():
     """In gusts, with predictive control; later calls of one program take few iterations and no other stage."""
-    controller, flight = fly(np.linspace(0.05, 0.55, 6), duration=0.6)
-    assert len(controller.replanned) == 6
+    controller, flight = fly(np.linspace(0.05, 0.35, 4), duration=0.4)
+    assert len(controller.replanned) == 4
     assert all(one.feasible for one in controller.replanned)
     assert max(one.off for one in controller.replanned) > 1e-3
     assert max(one.gap for one in controller.replanned) < 1e-9
@@ -92,7 +92,7 @@ def test_a_flight_goes_on_with_each_new_plan_without_a_jump():
     assert controller.rate_max <= RATE * (1 + 1e-9)
     assert [stage.name for stage in controller.last.stages] == ["nonlinear program, 100 steps", "audit"]
     assert controller.last.iterations <= 6
-    assert flight.answered["as planned"] == 600
+    assert flight.answered["as planned"] == 400
 
 
 def test_the_program_with_parameters_has_the_solution_of_one_without(circle):
@@ -159,14 +159,14 @@ def test_carriers_that_move_as_given_go_on_as_given():
 
 def test_a_rest_that_is_impossible_is_proven_and_does_not_count(circle):
     planner, whole = circle
-    still = state_of(whole, 8.0)
-    fast = still.velocity - np.array([0, 0, 30, 0, 0, 0])
-    fallen = planner.replan(still._replace(velocity=fast, tensions=np.full(6, 3.0)), 8.0)
+    still = state_of(whole, 9.5)
+    fast = still.velocity - np.array([0, 0, 60, 0, 0, 0])
+    fallen = planner.replan(still._replace(velocity=fast, tensions=np.full(6, 3.0)), 9.5)
     assert fallen.status is not MotionStatus.FEASIBLE
     assert fallen.certificate is not None
     assert fallen.certificate.shortfall > 1
     assert "wang-flying" in told(fallen)
-    assert planner.replan(still, 8.0).feasible
+    assert planner.replan(still, 9.5).feasible
 
 
 def test_a_state_of_a_controller_is_an_initial_state():

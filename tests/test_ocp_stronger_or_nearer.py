@@ -116,8 +116,7 @@ def test_a_rotation_ends_at_a_smaller_angle():
 
 
 @pytest.mark.parametrize(
-    ("start", "yaws", "wrong"),
-    [([-1, 0, 2], [0, 0.9, 0, 0.1], [1]), ([-1, 0, 2], [0.2, 0.9, -1.0, 0], [1, 2]), ([-1, 0.2, 2.2], [0, 1.4], [1])],
+    ("start", "yaws", "wrong"), [([-1, 0, 2], [0.2, 0.9, -1.0, 0], [1, 2]), ([-1, 0.2, 2.2], [0, 1.4], [1])]
 )
 def test_points_whose_yaw_cannot_be_held_are_named_with_the_nearest_that_can(start, yaws, wrong):
     """Statics by itself shows which points are wrong, and that a yaw a little nearer to the given one is wrong too."""

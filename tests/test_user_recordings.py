@@ -207,7 +207,7 @@ def test_frames_of_an_ahrs(what, tmp_path):
         assert abs(value - offsets[i]) < 4 * sigma + 5e-3
 
 
-@pytest.mark.parametrize("heading", [0, 10, 25])
+@pytest.mark.parametrize("heading", [0, 10])
 def test_offsets_turn_a_small_platform_as_another_heading_does(heading, tmp_path):
     """Offsets and the CoM explain orientations that are right; otherwise the fit finds the heading."""
     offsets = np.array([0.05, -0.04, 0.03, 0.06])

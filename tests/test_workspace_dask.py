@@ -113,7 +113,7 @@ def test_a_cluster_that_ends_is_one_line_within_ten_seconds(killed, message, tmp
         until(described.exists)
         until(lambda: "address" in (text := described.read_text()) and text.rstrip().endswith("}"))
         address = json.loads(described.read_text())["address"]
-        options = ["--samples", "1e8", "--scheduler", address, "--checkpoint", str(checkpoint)]
+        options = ["--samples", "2e7", "--scheduler", address, "--checkpoint", str(checkpoint)]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "cwd": tmp_path}
         started["command"] = subprocess.Popen([TOWLINE, "workspace", "wang-flying", *options], **pipes)
         sizes = set()
