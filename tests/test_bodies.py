@@ -43,7 +43,7 @@ BEAM = {
             },
         }
     ],
-    "steps": 40,
+    "steps": 20,
     "tube": {"position": 0.5, "attitude": 1},
     "limits": {
         "keep_out": [{"kind": "capsule", "start": [0, 1.2, 0], "end": [0, 1.2, 6], "radius": 0.2, "cables": None}]
@@ -325,7 +325,7 @@ def test_a_plan_stays_above_the_floor():
     task = {
         "path": {"kind": "line", "start": [-3, 0, 1.5], "end": [3, 0, 1.5]},
         "duration": 8,
-        "steps": 40,
+        "steps": 20,
         "tube": {"position": "free"},
         "limits": {"keep_out": [wall]},
     }

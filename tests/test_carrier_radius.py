@@ -51,7 +51,7 @@ def past(distance, **place):
     return {
         "path": {"kind": "line", "start": [0, 0, 0.5], "end": [2, 0, 0.5]},
         "duration": 4,
-        "steps": 30,
+        "steps": 16,
         "tube": {"position": 0.3},
         "base": {"kind": "free", "ends": "rest", "around": around},
         "objective": {"carrier_offset": 0.5},
