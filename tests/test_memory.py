@@ -31,7 +31,8 @@ def test_mixed_operations_on_ever_new_robots_keep_nothing(tmp_path):
         other = robot.model_copy(update={"platform": robot.platform.model_copy(update={"mass": mass})})
         towline.tensions(other, other.home)
         found = towline.plan(other, REST)
-        read(found.save(tmp_path / "plan.nc"))
+        if number >= REMEMBERED - 3:  # takes most of the time
+            read(found.save(tmp_path / "plan.nc"))
         found.report()
         towline.simulate(other, found, duration=0.01).to_dict()
         towline.sample(other, StaticEquilibrium(), samples=200)
