@@ -75,14 +75,17 @@ def test_netcdf_there_and_back(built, tmp_path):
     poses[3] = np.nan
     tensions = np.full((60, 8), 300.0)
     first = Measurements(built.readings, poses, tensions=tensions, times=np.arange(60) / 9, sigma=sigma)
+    first.framed = ("frame", "body")  # as `corrected` found them
     log = read_measurements(first.save(tmp_path / "log.nc"))
     for name in ("lengths", "poses", "tensions", "times"):
         np.testing.assert_array_equal(getattr(log, name), getattr(first, name))
     assert log.sigma._asdict() == sigma
+    assert log.framed == ("frame", "body")
     bare = Measurements(built.readings)
     log = read_measurements(bare.save(tmp_path / "log.nc"), sigma=5e-3)
     assert log.poses is log.tensions is log.times is None
     assert log.sigma.lengths == 5e-3
+    assert log.framed == ()
 
 
 def test_netcdf_of_others(built, tmp_path):

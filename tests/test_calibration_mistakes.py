@@ -283,6 +283,7 @@ def test_standard_deviations_include_the_error_of_a_frame_that_was_found():
         true = dict(zip(result.identifiable[:3], built.robot.anchors[0], strict=False))
         z += [(one.value - true[one.name]) / one.sigma for one in result.parameters if one.name in true]
     assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.6  # 9 numbers, nearly three of them independent
+    assert "frame" in calibrate("cogiro", fixed, "auto").free
 
 
 @pytest.mark.parametrize("what", ["frame turned", "cables reversed"])

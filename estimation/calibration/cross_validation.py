@@ -44,17 +44,7 @@ CHANCE = 3.0  # times the logarithm of the number of residuals, by which a param
 WORSE = 1.02  # of the smallest error left out that a smaller set of parameters may have
 CLEANED = {"anchors", "offsets", "clock"}  # found while wrong readings are looked for
 FORCES = ("mass", "com", "capstan", "friction", "zeros")  # of which auto selects
-ALWAYS = (
-    "clock",
-    "frame",
-    "body",
-    "mass",
-    "com",
-    "capstan",
-    "friction",
-    "gains",
-    "zeros",
-)  # groups that the sets of a comparison share
+ALWAYS = ("clock", "frame", "body", *IN_BALANCE)  # groups that the sets of a comparison share
 CERTAIN = 3.0  # standard deviations that a clock offset must differ from 0
 NESTED: tuple[tuple[str, ...], ...] = (
     (),
@@ -140,17 +130,17 @@ def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[st
     if turns is not None and not turns.enough:
         sets = [one for one in sets if "attachments" not in one]
     check_enough(robot, measurements, ("offsets",), {})
-    always = measurements.framed
-    clock = (*always, *(("clock",) if "clock" in usual(robot, measurements) else ()))
-    first = [one for one in sets if one and set(one) <= CLEANED and is_enough(robot, measurements, (*one, *clock))][-1]
-    solved = solve(robot, measurements, (*first, *clock), {}, outliers)
+    clock, frames = ("clock",) if "clock" in usual(robot, measurements) else (), measurements.framed
+    always = (*clock, *frames)
+    first = [one for one in sets if one and set(one) <= CLEANED and is_enough(robot, measurements, (*one, *always))][-1]
+    solved = solve(robot, measurements, (*first, *always), {}, outliers)
     if clock and not CERTAIN * _clock_sigma(solved) < abs(solved.fit.state.x[solved.model.parameters.clock]):
         # Errors of the poses' velocities let a clock offset seem certain where the lengths hardly change.
-        clock = ()
-    forces = _forces(solved, (*first, *clock))
+        always = frames
+    forces = _forces(solved, (*first, *always))
     if measurements.tensions is not None:
         sets += [(*one, "stiffness") for one in sets if "offsets" in one]
-    best = _compare(solved, [(*one, *clock, *forces) if one else one for one in sets], {}).best
+    best = _compare(solved, [(*one, *always, *forces) if one else one for one in sets], {}).best
     for word in forces if best else ():
         without = tuple(name for name in best if name != word)
         less, whole = (one.balance for one in _compare(solved, [without, best], {}, True).sets)

@@ -2,13 +2,16 @@
 
 Poses in an unknown frame tell the anchors only up to a rigid motion of them all. How well the file's anchors tell that
 depends on how far they are from the true ones, which the others of their changes show: with a variance s^2 of the
-file's errors, and v_k of the fit's along principal axis k, the change c_k has the variance s^2 + v_k. Of the K axes
-that the log determines, s^2 is the mean of c_k^2 - v_k. It is multiplied by K / (K - 2), the variance of Student's t.
+file's errors, and v_k of the fit's along principal axis k, the change c_k has the variance s^2 + v_k. A log determines
+few axes, so s^2 remains uncertain. With Jeffreys' prior for s^2, errors of the rigid motion have a distribution with
+long tails (of Student, with as many degrees of freedom as axes, where v_k is small). The prior is the normal
+distribution whose 95 % ellipsoid is that of these errors.
 """
 
 from collections.abc import Mapping
 
 import numpy as np
+from scipy.special import chdtr, chdtri
 
 from .parameters import COLUMNS
 from .solving import LOOSE, LOOSE_SHARE, Solved, covariance_of, noise_of
@@ -33,10 +36,14 @@ def errors_of_file(solved: Solved, prior: Mapping[str, float]) -> dict[str, floa
         own, first = columns[of.varies], solved.model.prior[name]
         variances, axes = np.linalg.eigh(covariance[np.ix_(own, own)])
         known = variances < DETERMINED * first**2
-        v, squares, count = variances[known], (change[own] @ axes[:, known]) ** 2, int(known.sum())
-        if count < 3:
+        if not known.any():
             result[name] = first
             continue
-        found = max(float((squares - v).mean()), float(v.mean()) * np.sqrt(2 / count))
-        result[name] = float(np.sqrt(found * count / (count - 2)))
+        v, squares = variances[known], (change[own] @ axes[:, known]) ** 2
+        s2 = first**2 * np.geomspace(1e-9, 1.0, 300)
+        total = s2[:, None] + v
+        logs = np.log(s2 * np.sqrt((total**-2).sum(axis=1))) - (np.log(total) + squares / total).sum(axis=1) / 2
+        likely = np.exp(logs - logs.max())
+        covered = chdtr(3, chdtri(3, 0.05) * s2[:, None] / s2) @ likely / likely.sum()
+        result[name] = float(np.sqrt(np.interp(0.95, covered, s2)))
     return result

@@ -185,7 +185,8 @@ class Measurements(Displayed):
             coordinates["axis"] = Variable(("axis",), np.array(COORDINATES[:3]))
         if self.times is not None:
             coordinates["time"] = Variable(("time",), self.times, {"units": "s"})
-        attributes = {f"sigma_{name}": value for name, value in self.sigma._asdict().items()}
+        attributes = {"framed": " ".join(self.framed)} if self.framed else {}
+        attributes |= {f"sigma_{name}": value for name, value in self.sigma._asdict().items()}
         return save_netcdf(Contents(variables, coordinates, attributes), file_path("path", path))
 
 

@@ -320,6 +320,7 @@ def measurements_of(
         known = sigmas.get("sigma", {})
         sigmas["sigma"] = {"rotation": AHRS, **(known if isinstance(known, Mapping) else {"lengths": known})}
     measured = Measurements(lengths.values[kept], **arguments, **sigmas)
+    measured.framed = source.recording.framed
     if measured.tensions is not None:
         notes += unreadable_notes(measured.tensions, measured.lengths)
     return Log(measured, found, [*notes, *read.notes], begin, clock=clock)

@@ -52,6 +52,7 @@ class Recording:
         where, kind: Path and kind of the file, such as "MCAP".
         topics: Its topics by their names.
         sigma: Standard deviations that the file states, by the names of `Sigma`.
+        framed: Frames of its poses that are known roughly, as in `Measurements`.
         notes: Remarks about the file, such as that its end is missing.
         ahead: Time by which its clock is ahead of that of the poses [s], which is found when several files are read
             together.
@@ -61,6 +62,7 @@ class Recording:
     kind: str
     topics: Mapping[str, Topic]
     sigma: Mapping[str, float] = field(default_factory=dict)
+    framed: tuple[str, ...] = ()
     notes: Sequence[str] = ()
     ahead: float = 0.0
 

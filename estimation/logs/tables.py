@@ -164,7 +164,8 @@ def from_netcdf(content: bytes, where: str) -> Recording:
         sizes = ", ".join(str(size) for size in sorted(longest))
         raise InputError(f"variables must have one size, got {sizes} ({wrong[0]})")
     columns = {name: column for name, column in columns.items() if len(column) == rows}
-    return Recording(where, "NetCDF", {"": _table(columns, units), **topics}, stated)
+    framed = tuple(name for name in ("frame", "body") if name in str(known.get("framed", "")).split())
+    return Recording(where, "NetCDF", {"": _table(columns, units), **topics}, stated, framed)
 
 
 def _table(columns: Mapping[str, np.ndarray], units: Mapping[str, str], name: str = "") -> Topic:
@@ -194,7 +195,7 @@ def _attributes(of: Any) -> dict[str, Any]:
     """Return the texts and single numbers among the attributes of a file or a variable."""
     result: dict[str, Any] = {}
     for name in of.attrs:
-        if name == "units" or name.startswith("sigma_"):
+        if name in ("units", "framed") or name.startswith("sigma_"):
             value = np.asarray(of.attrs[name]).ravel()
             text = value[0] if value.size == 1 else ""
             result[name] = text.decode("utf-8") if isinstance(text, bytes) else text
