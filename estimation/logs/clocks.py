@@ -33,16 +33,15 @@ SURELY, LIKE = 10.0, 0.8  # standard deviations of such an offset, and the corre
 
 def clock_of_poses(
     lengths: Samples,
-    position: Samples,
-    quaternions: np.ndarray | None,
+    pose: Samples,
     source: Field,
     first: Field,
     robot: Robot | None,
     given: LogMap | None,
     from_: Sequence[Recording],
 ) -> Clock | None:
-    """Return the clock of poses by cable speeds, or None if poses and lengths have one."""
-    times, pose_times = lengths.times, position.times
+    """Return the clock of poses by cable speeds, or None if poses and lengths have one; arguments as in `aligned`."""
+    times, pose_times = lengths.times, pose.times
     assert times is not None
     assert pose_times is not None
     for one in (times, pose_times):
@@ -52,7 +51,7 @@ def clock_of_poses(
         if robot is None:
             return None
         try:
-            clock = aligned(lengths, position, quaternions, robot, given, from_)
+            clock = aligned(lengths, pose, robot, given, from_)
         except ClockJumpError:
             raise
         except InputError:
@@ -66,23 +65,18 @@ def clock_of_poses(
         raise InputError("lengths must change to align the clocks, got those of locked winches")
     if robot is None:
         raise InputError("robot must be given to align the clocks of lengths and poses, got None")
-    return aligned(lengths, position, quaternions, robot, given, [one for one in from_ if one is source.recording])
+    return aligned(lengths, pose, robot, given, [one for one in from_ if one is source.recording])
 
 
 def aligned(
-    lengths: Samples,
-    position: Samples,
-    quaternions: np.ndarray | None,
-    robot: Robot,
-    given: LogMap | None,
-    of_poses: Sequence[Recording],
+    lengths: Samples, pose: Samples, robot: Robot, given: LogMap | None, of_poses: Sequence[Recording]
 ) -> Clock:
-    """Return the clock of poses in other recordings, which have those of moving carriers too."""
-    known = np.isfinite(position.values).all(axis=1)
-    if quaternions is not None:
-        known &= np.isfinite(quaternions).all(axis=1)
-    rows = np.flatnonzero(known)
-    if len(rows) < 4 or lengths.times is None or position.times is None:
+    """Return the clock of poses in other recordings, which have those of moving carriers too.
+
+    `pose` is of positions (N, 3) [m], followed by quaternions (N, 4) where orientations were recorded.
+    """
+    rows = np.flatnonzero(np.isfinite(pose.values).all(axis=1))
+    if len(rows) < 4 or lengths.times is None or pose.times is None:
         raise InputError("poses with positions must be measured to align the clocks, got none")
     rows = rows[:: max(1, len(rows) // MOST_ALIGNED)]
     complete = np.isfinite(lengths.values).all(axis=1)
@@ -91,24 +85,24 @@ def aligned(
     if lengths.values.shape[1] != robot.m:
         raise InputError(f"lengths must have a column for each of the {robot.m} cables, got {lengths.values.shape[1]}")
     poses = np.tile(robot.home, (len(rows), 1))
-    poses[:, :3] = position.values[rows]
+    poses[:, :3] = pose.values[rows, :3]
     carriers, effects = None, [poses[:, :3]]
     if any(carrier.moves for carrier in robot.carriers):
-        seen = position.times[rows]
+        seen = pose.times[rows]
         carriers = carriers_at(robot, of_poses, given, seen, len(rows), [])[0]
         kept = np.isfinite(carriers).all(axis=(1, 2))
         if not kept.any():
             raise InputError(f"poses must include those of the carriers of {robot.name} to align clocks, got none")
         rows, poses, carriers = rows[kept], poses[kept], carriers[kept]
         effects = [poses[:, :3], *np.swapaxes(carriers[..., :3], 0, 1)]
-    if quaternions is not None:
-        rotation = Rotation.from_quat(quaternions[rows])
+    if pose.values.shape[1] > 3:
+        rotation = Rotation.from_quat(pose.values[rows, 3:])
         poses[:, 3:] = points.angles(rotation.as_matrix())
         effects.append((rotation * rotation[0].inv()).as_rotvec())
     effects = np.hstack(effects)
     effects = effects[:, np.ptp(effects, axis=0) > 1e-6]
     along = np.asarray(Dynamics(robot).cable_lengths(poses, carriers))
-    signals = lengths.times[complete], lengths.values[complete], position.times[rows], along, effects
+    signals = lengths.times[complete], lengths.values[complete], pose.times[rows], along, effects
     if of_poses:
         check_jumps(*signals)
     return align(*signals)
@@ -125,9 +119,10 @@ def realigned(
     times, poses, known = measurements.times, measurements.poses, tracked(robot, measurements)
     if times is None or poses is None or measurements.carrier_poses is not None or known.sum() < 4:
         return measurements, None
-    turns = unit_quaternions(poses[:, 3:]) if np.isfinite(poses[:, 3:]).any() else None
+    turns = unit_quaternions(poses[:, 3:]) if np.isfinite(poses[:, 3:]).any() else poses[:, :0]
+    seen = Samples(times, np.hstack([poses[:, :3], turns]))
     try:
-        clock = aligned(Samples(times, measurements.lengths), Samples(times, poses[:, :3]), turns, robot, None, [])
+        clock = aligned(Samples(times, measurements.lengths), seen, robot, None, [])
     except InputError:
         return measurements, None
     position, rotation, _ = measured_poses(robot, measurements)

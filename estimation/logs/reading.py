@@ -263,8 +263,8 @@ def measurements_of(
         lengths = Samples(lengths.times, np.tile(np.asarray(robot.fixed_lengths), (len(lengths.values), 1)))
     if not len(lengths.values):
         raise InputError(f"{main.full} and fields like it must have samples at the same times, got none")
-    tensions = read.stream(found.tensions) if found.tensions else None
-    if tensions is not None and (np.nanmedian(tensions.values, axis=0) < 0).all():
+    tensions = read.stream(found.tensions) if found.tensions else Samples(lengths.times, lengths.values[:, :0])
+    if found.tensions and (np.nanmedian(tensions.values, axis=0) < 0).all():
         notes.append("all tensions are negative, so they are read with the other sign")
         tensions = Samples(tensions.times, -tensions.values)
     orientation = _whole(robot, read.stream(found.orientation), 3) if found.orientation else None
@@ -293,29 +293,25 @@ def measurements_of(
                 f"lengths and poses of several files or topics must have times, got none for {lost}; a map "
                 "(--fields) may name them, as in 'time: clock [ms]'"
             )
-        quaternions = None if orientation is None else unit_quaternions(orientation.values)
         places = np.full((len(pose.values), 3), np.nan) if position is None else position.values
-        clock = clock_of_poses(lengths, Samples(pose.times, places), quaternions, source, main, robot, given, from_)
-        lengths, tensions, places, quaternions = _merged(
-            lengths, tensions, Samples(pose.times, places), quaternions, main, clock, notes
-        )
-        position = None if position is None else Samples(lengths.times, places)
-        orientation = None if quaternions is None else Samples(lengths.times, quaternions)
-    elif tensions is not None:
+        turns = places[:, :0] if orientation is None else unit_quaternions(orientation.values)
+        pose = Samples(pose.times, np.hstack([places, turns]))  # (N, 3) or (N, 7)
+        clock = clock_of_poses(lengths, pose, source, main, robot, given, from_)
+        lengths, tensions, pose = _merged(lengths, tensions, pose, main, clock, notes)
+        position, orientation = (Samples(pose.times, one) for one in (pose.values[:, :3], pose.values[:, 3:]))
+    elif found.tensions:
         good = np.isfinite(tensions.values).all(axis=1)
         if tensions.times is not None:
             tensions = Samples(tensions.times[good], tensions.values[good])
         tensions = at_times(lengths.times, tensions, found.tensions[0])
-    kept = _kept(lengths.values, found.lengths)
-    if tensions is not None:
-        kept &= _kept(tensions.values, found.tensions)
+    kept = _kept(lengths.values, found.lengths) & _kept(tensions.values, found.tensions)
     if not kept.all():
         notes.append(f"samples skipped because lengths or tensions are missing: {quantity(int((~kept).sum()))}")
     arguments: dict[str, Any] = {"times": None if lengths.times is None else (lengths.times - begin)[kept]}
-    for name, one in (("tensions", tensions), ("poses", position), ("orientations", orientation)):
-        if one is not None:
-            arguments[name] = one.values[kept]
-    if position is None and orientation is not None and "rotation" not in (sigmas.get("sigma") or {}):
+    sensors = {"tensions": (tensions, found.tensions), "poses": (position, found.position)}
+    sensors["orientations"] = orientation, found.orientation
+    arguments |= {name: one.values[kept] for name, (one, recorded) in sensors.items() if one is not None and recorded}
+    if found.orientation and not found.position and "rotation" not in (sigmas.get("sigma") or {}):
         notes.append(f"orientations without positions are taken to be good to {quantity(np.degrees(AHRS), 'deg', 2)}")
         known = sigmas.get("sigma", {})
         sigmas["sigma"] = {"rotation": AHRS, **(known if isinstance(known, Mapping) else {"lengths": known})}
@@ -339,52 +335,39 @@ def _whole(robot: Robot | None, samples: Samples, first: int) -> Samples:
 
 
 def _merged(
-    lengths: Samples,
-    tensions: Samples | None,
-    position: Samples,
-    quaternions: np.ndarray | None,
-    first: Field,
-    clock: Clock | None,
-    notes: list[str],
-) -> tuple[Samples, Samples | None, np.ndarray, np.ndarray | None]:
-    """Return lengths, tensions, positions (N, 3) and quaternions (N, 4) at the same times."""
-    times, pose_times = lengths.times, position.times
+    lengths: Samples, tensions: Samples, pose: Samples, first: Field, clock: Clock | None, notes: list[str]
+) -> list[Samples]:
+    """Return lengths, tensions and poses at the same times; arguments as in `measurements_of`."""
+    times, pose_times, poses = lengths.times, pose.times, pose.values
     assert times is not None
     assert pose_times is not None
     if clock is not None:
         pose_times = (pose_times - clock.offset) / clock.rate
         notes.append(f"{clock} (by cable speeds, whose correlation is {clock.likeness:.2f})")
-    known = np.isfinite(position.values).all(axis=1) | np.isnan(position.values).all()
-    if quaternions is not None:
-        known &= np.isfinite(quaternions).all(axis=1)
-    pose_times, places = pose_times[known], position.values[known]
-    quaternions = None if quaternions is None else quaternions[known]
+    nowhere = np.isnan(poses[:, :3]).all()
+    known = np.isfinite(poses[:, 3 if nowhere else 0 :]).all(axis=1)
+    pose_times, poses = pose_times[known], poses[known]
     if len(pose_times) < 4:
         raise InputError(f"poses must be measured at four times or more, got {len(pose_times)}")
     if np.median(np.diff(pose_times)) >= 0.7 * np.median(np.diff(times)):
         at, inside = pose_times, (pose_times >= times[0]) & (pose_times <= times[-1])
     else:
-        at = times
-        turned = np.tile(np.eye(3), (len(places), 1, 1))
-        if quaternions is not None:
-            turned = Rotation.from_quat(quaternions).as_matrix()
-        track = PoseTrack(pose_times, np.nan_to_num(places), turned, np.ones(len(places), dtype=bool)).at_times(times)
+        at, width = times, poses.shape[1]
+        turned = Rotation.from_quat(poses[:, 3:] if width > 3 else np.tile([0, 0, 0, 1], (len(poses), 1))).as_matrix()
+        whole = PoseTrack(pose_times, np.nan_to_num(poses[:, :3]), turned, np.ones(len(poses), dtype=bool))
+        track = whole.at_times(times)
         inside = track.inside(0.0)
-        nowhere = np.isnan(places).all()
         places, matrices = track.at(0.0)[:2]
         places = np.where(nowhere, np.nan, places)
-        quaternions = None if quaternions is None else Rotation.from_matrix(matrices).as_quat()
+        poses = np.hstack([places, Rotation.from_matrix(matrices).as_quat()])[:, :width]
     moved = interpolated(at, lengths) if at is not times else lengths.values
-    forces = None if tensions is None else at_times(at, tensions, first).values
-    kept = np.isfinite(moved).all(axis=1) & inside
-    kept &= True if forces is None else np.isfinite(forces).all(axis=1)
+    forces = at_times(at, tensions, first).values if tensions.values.size else np.empty((len(at), 0))
+    kept = np.isfinite(moved).all(axis=1) & np.isfinite(forces).all(axis=1) & inside
     if not kept.any():
         raise InputError("lengths and poses must have samples at the same times, got none")
     if not kept.all():
         notes.append(f"samples skipped because not all sensors have them: {quantity(int((~kept).sum()))}")
-    forces = None if forces is None else Samples(at[kept], forces[kept])
-    turned = None if quaternions is None else quaternions[kept]
-    return Samples(at[kept], moved[kept]), forces, places[kept], turned
+    return [Samples(at[kept], one[kept]) for one in (moved, forces, poses)]
 
 
 def _kept(values: np.ndarray, fields: Sequence[Field]) -> np.ndarray:
