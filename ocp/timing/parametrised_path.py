@@ -208,7 +208,7 @@ class ParametrisedPath:
         every = Limits(self.robot, (CableAcceleration(self.robot, 1.0),))
         P, Q, _ = next(_parts(every, platform, carriers))
         inertia = np.array([cable.winch.inertia if cable.winch else 0.0 for cable in self.robot.cables])
-        return 0.7 * P * inertia, Q * inertia
+        return P * inertia, Q * inertia
 
     def _frame(self) -> bool:
         only = self.robot.carriers[0].name if len(self.robot.carriers) == 1 else None
