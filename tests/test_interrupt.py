@@ -262,9 +262,9 @@ def processes_of(session):
     return found
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_a_command_and_its_workers(number, tmp_path):
-    """A terminal, Slurm and systemd send it to the workers too; to the command alone, below."""
+@pytest.mark.parametrize(("number", "to_all"), [(signal.SIGINT, True), (signal.SIGTERM, False), (signal.SIGTERM, True)])
+def test_a_signal_ends_a_command_and_its_workers(number, to_all, tmp_path):
+    """A terminal, Slurm and systemd send it to the workers too, a container to the command alone."""
     (tmp_path / "circle.yaml").write_text(CIRCLE)
     command = [TOWLINE, *SWEEP, "--checkpoint", "c"]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
@@ -274,7 +274,7 @@ def test_a_signal_ends_a_command_and_its_workers(number, tmp_path):
         time.sleep(0.05)
         assert process.poll() is None, process.stderr.read()
         sizes |= {(tmp_path / "c-wal").stat().st_size} if (tmp_path / "c-wal").exists() else set()
-    out, err, _ = stop(process, number, os.killpg)  # the time is also that of its workers
+    out, err, _ = stop(process, number, os.killpg if to_all else os.kill)  # the time is also that of its workers
     assert (process.returncode, out) == (STOP[number], "")
     # What is stored is counted a moment later.
     counted = r"towline: stopped( after \d+ of 251 plans)?; to continue, repeat the command with --resume c\n"
