@@ -13,7 +13,6 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from ...models.batch import in_blocks
-from ...models.points import placed
 from ..limits.distance import Distance
 from ..limits.limits import Separating, motions
 from ..tasks.paths import Motion
@@ -99,11 +98,8 @@ def _between_nodes(audited: Instants, limit: Distance, time: float, which: int) 
 
 def _moved(audited: Instants) -> np.ndarray:
     """Return how far any point of platform and carriers moves at most from one instant to the next, (n - 1,) [m]."""
-    platform, carriers = audited.motion.pose, audited.carriers.pose
-    com = placed(platform, np.array([audited.scenario.robot.platform.com]))
-    corners = placed(platform, audited.scenario.body_corners)
-    points = [*audited.scenario.dynamics.points(platform, carriers), com, corners, carriers[..., :3]]
-    return _ways(audited.times, np.concatenate(points, axis=1)).max(axis=1)
+    points = audited.scenario.moving_points(audited.motion.pose, audited.carriers.pose)
+    return _ways(audited.times, points).max(axis=1)
 
 
 def _ways(times: np.ndarray, points: np.ndarray) -> np.ndarray:

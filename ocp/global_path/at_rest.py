@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...models.points import placed
 from ...solvers import solve_batch
 from ..audits.tensions import few_and_inverse, scaled
 from ..limits import Limit, Rate
@@ -25,7 +24,7 @@ class Kept(NamedTuple):
 
     # (n,) [m]: by how much everything that moves may move before a limit is exceeded; negative where one is.
     slack: np.ndarray
-    points: np.ndarray  # (n, k, 3) [m]: what moves: attachments, anchors, and corners of bodies
+    points: np.ndarray  # (n, k, 3) [m]: what moves
     worst: np.ndarray  # (n,) index of the limit that is kept by least; -1 where there are no tensions
 
 
@@ -65,10 +64,7 @@ class AtRest:
 
     def __call__(self, platform: np.ndarray, carriers: np.ndarray, off_path: np.ndarray | None = None) -> Kept:
         """Return by how much limits are kept by platform (n, 6) and carriers (n, c, 6)."""
-        anchors, attachments = self.scenario.dynamics.points(platform, carriers)
-        corners = self.scenario.body_corners
-        bodies = [placed(platform, corners)] if len(corners) else []
-        points = np.concatenate([attachments, anchors, *bodies], axis=1)
+        points = self.scenario.moving_points(platform, carriers)
         A, w, tensions, exist, spans = self._balance(platform, carriers)
         tilted = with_tilts(self.scenario, A, tensions, carriers, np.zeros_like(carriers))
         slack, worst = self._slack(platform, tilted, tensions, off_path)
@@ -108,8 +104,8 @@ class AtRest:
         if self._weight is not None:
             w = np.broadcast_to(self._weight, platform.shape)
         else:
-            still = Motion(platform, *np.zeros((2, *platform.shape)))
-            w = scaled(scenario, scenario.required_wrench(np.zeros(len(platform)), still, wind=scenario.wind))
+            times, still = np.zeros(len(platform)), Motion.still(platform)
+            w = scaled(scenario, scenario.required_wrench(times, still, wind=scenario.wind))
         few, inverse = few_and_inverse(A, len(robot.platform.dof))
         tensions = np.clip((inverse @ w[..., None])[..., 0], *self._bounds)
         missed = np.linalg.norm((A @ tensions[..., None])[..., 0] - w, axis=1)

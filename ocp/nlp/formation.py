@@ -15,7 +15,6 @@ from itertools import product
 import numpy as np
 
 from ...base.display import Displayed
-from ...models.points import placed
 from ..limits.distance import Distance
 from ..tasks.ends import carrier_ends, platform_ends
 from ..tasks.paths import Motion
@@ -154,9 +153,8 @@ def _beyond(scenario: Scenario, platform: np.ndarray, carriers: np.ndarray, trie
     So many `tries` in turn are near each other: from the distances of one those of most others are known to suffice.
     """
     beyond, limits = np.zeros(len(platform)), scenario.limits
-    others = limits.along(_at_rest(platform), _at_rest(carriers), distances=False)
-    corners, (ends, anchors) = placed(platform, scenario.body_corners), scenario.dynamics.points(platform, carriers)
-    points = np.concatenate([ends, anchors, corners, carriers[..., :3]], axis=1)
+    others = limits.along(Motion.still(platform), Motion.still(carriers), distances=False)
+    points = scenario.moving_points(platform, carriers)
     points = points.reshape(-1, tries, *points.shape[1:])
     moved = np.linalg.norm(points - points[:, tries // 2, None], axis=3).max(axis=2)
     for limit, values in zip(limits, others, strict=True):
@@ -165,17 +163,13 @@ def _beyond(scenario: Scenario, platform: np.ndarray, carriers: np.ndarray, trie
         rows = np.arange(len(platform))
         if isinstance(limit, Distance):
             if np.isfinite(limit.per_metre):
-                middle = (_at_rest(pose[tries // 2 :: tries]) for pose in (platform, carriers))
+                middle = (Motion.still(pose[tries // 2 :: tries]) for pose in (platform, carriers))
                 slack = limits.distances(limit, *middle).min(axis=1) - limit.low
                 rows = np.flatnonzero(slack[:, None] - limit.per_metre * moved < CLEARANCE)
-            values = limits.distances(limit, *(_at_rest(pose[rows]) for pose in (platform, carriers)))
+            values = limits.distances(limit, *(Motion.still(pose[rows]) for pose in (platform, carriers)))
         for side in (limit.low + CLEARANCE - values, values - limit.high + CLEARANCE):
             beyond[rows] += np.maximum(side, 0.0).sum(axis=1)
     return beyond
-
-
-def _at_rest(pose: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return pose, np.zeros_like(pose), np.zeros_like(pose)
 
 
 def _best(scenario: Scenario, places: _References, tried: np.ndarray, span: np.ndarray) -> np.ndarray:

@@ -10,7 +10,6 @@ from typing import Self
 import numpy as np
 
 from ...base.display import Displayed
-from ...models.points import placed
 from ..limits import Limit
 from ..limits.bodies import Inside
 from ..limits.limits import Limits
@@ -128,8 +127,7 @@ def _kept(scenario: Scenario, shares: np.ndarray, motion: Deviation) -> tuple[np
     """
     lasting = scenario.lasting(float(motion.nodes[-1]))
     platform, carriers = lasting.motion(shares * lasting.duration, motion)
-    corners = placed(platform.pose, scenario.body_corners)
-    points = np.concatenate([*scenario.dynamics.points(platform.pose, carriers.pose), corners], axis=1)
+    points = scenario.moving_points(platform.pose, carriers.pose)
     slack, values = [], lasting.limits.along(platform, carriers)
     for index, picked in parts(lasting.limits):
         limit, its = lasting.limits.all[index], values[index][:, picked]

@@ -127,8 +127,7 @@ def _tensions_at_rest(scenario: Scenario, time: float, carriers: np.ndarray, tur
     def wrenches(offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return wrench matrices (n, 6, m), required wrenches (n, 6) and cable lengths (n, m)."""
         poses, places = turned(offsets), np.repeat(carriers[None], len(offsets), axis=0)
-        still, dynamics = np.zeros_like(poses), scenario.dynamics
-        bodies = Motion(poses, still, still), Motion(places, np.zeros_like(places), np.zeros_like(places))
+        dynamics, bodies = scenario.dynamics, (Motion.still(poses), Motion.still(places))
         w = scenario.required_wrench(np.full(len(poses), time), *bodies, None)
         return (
             scaled(scenario, dynamics.wrench_matrix(poses, places)),

@@ -85,6 +85,11 @@ class Scenario(Displayed):
         parts = [skeleton(body).corners for body in (self.robot.platform.body, *loads) if body is not None]
         return np.concatenate([np.zeros((0, 3)), *parts])
 
+    def moving_points(self, platform: np.ndarray, carriers: np.ndarray) -> np.ndarray:
+        """Return the points of platform (n, 6) and carriers (n, c, 6) between which all others are, (n, k, 3) [m]."""
+        corners = points.placed(platform, np.vstack([self.robot.platform.com, self.body_corners]))
+        return np.concatenate([*self.dynamics.points(platform, carriers), corners, carriers[..., :3]], axis=1)
+
     def in_force(self, limit: Limit, times: np.ndarray) -> np.ndarray:
         """Return at which of `times` a limit holds, (n,): in its phases, their boundaries included."""
         if limit.phases is None:

@@ -22,6 +22,11 @@ class Motion(NamedTuple):
 
     __repr__ = record
 
+    @classmethod
+    def still(cls, pose: np.ndarray) -> Motion:
+        """Return poses (n, 6) at rest."""
+        return cls(pose, np.zeros_like(pose), np.zeros_like(pose))
+
     def plus(self, deviation: Iterable[np.ndarray]) -> Motion:
         """Add a deviation of pose, velocity and acceleration, coordinate by coordinate."""
         return Motion(*(mine + its for mine, its in zip(self, deviation, strict=True)))

@@ -18,5 +18,4 @@ class RestPath(PathBase):
 
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:
-        pose = np.tile(np.array(self.pose), (len(times), 1))
-        return Motion(pose, np.zeros_like(pose), np.zeros_like(pose))
+        return Motion.still(np.tile(np.array(self.pose), (len(times), 1)))
