@@ -13,7 +13,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import chdtr, chdtri
 
-from .parameters import COLUMNS
+from .parameters import Parameters
 from .solving import LOOSE, LOOSE_SHARE, Solved, covariance_of, noise_of
 
 ENDS = {"frame": "anchors", "body": "attachments"}  # what an unknown frame moves together with
@@ -28,19 +28,16 @@ def loose(length: float, groups: tuple[str, ...], prior: Mapping[str, float]) ->
 
 def errors_of_file(solved: Solved, prior: Mapping[str, float]) -> dict[str, float]:
     """Return standard deviations with those of the file's errors, from a fit with `loose` ones in place of them."""
-    of, result = solved.model.parameters, dict(prior)
+    of, result = solved.model.parameters, dict(solved.model.prior)
     covariance, change = covariance_of(solved, noise_of(solved)), (solved.fit.state.x - of.first)[of.varies]
     for name in set(solved.model.prior) - set(prior):
-        columns = np.zeros(of.count, dtype=bool)
-        of.table(columns)[:, COLUMNS[name]] = True
-        own, first = columns[of.varies], solved.model.prior[name]
+        own = np.isin(np.flatnonzero(of.varies), np.flatnonzero(Parameters(of.robot, (name,)).varies))
         variances, axes = np.linalg.eigh(covariance[np.ix_(own, own)])
-        known = variances < DETERMINED * first**2
+        known = variances < DETERMINED * result[name] ** 2
         if not known.any():
-            result[name] = first
             continue
         v, squares = variances[known], (change[own] @ axes[:, known]) ** 2
-        s2 = first**2 * np.geomspace(1e-9, 1.0, 300)
+        s2 = result[name] ** 2 * np.geomspace(1e-9, 1.0, 300)
         total = s2[:, None] + v
         logs = np.log(s2 * np.sqrt((total**-2).sum(axis=1))) - (np.log(total) + squares / total).sum(axis=1) / 2
         likely = np.exp(logs - logs.max())

@@ -14,7 +14,7 @@ from ..pose.estimate import largest_cost
 from .fit import held
 from .geometry import length_of
 from .normal_equations import NormalEquations, metric
-from .parameters import COLUMNS
+from .parameters import Parameters
 from .solving import Solved, inflation_of, noise_of
 
 USUAL = 0.1  # of the mean tension, standard deviation of zeros
@@ -52,12 +52,10 @@ def has_zeros(solved: Solved) -> bool:
         return False
     groups, prior = with_zeros(measured, groups, of.prior)
     model = replace(of, parameters=replace(of.parameters, groups=groups), prior=prior)
-    scale, varies = metric(model), model.parameters.varies
+    scale, columns = metric(model), np.flatnonzero(Parameters(model.robot, ("zeros",)).varies)
     equations = NormalEquations.at(model, state, scale)
     covariance = np.linalg.inv(held(equations.S, length_of(model.robot)))
-    columns = np.zeros(len(varies), dtype=bool)
-    model.parameters.table(columns)[:, COLUMNS["zeros"]] = True
-    own = columns[varies]
+    own = np.isin(np.flatnonzero(model.parameters.varies), columns)
     zeros, spread = (-covariance @ equations.b)[own], covariance[np.ix_(own, own)]
     squares = float(zeros @ np.linalg.solve(spread, zeros)) / inflation_of(noise_of(solved))
     size = np.sqrt(((zeros / scale[columns]) ** 2).mean()) / float(np.abs(measured.tensions).mean())
