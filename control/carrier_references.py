@@ -209,9 +209,8 @@ class Tethered(Late):
 
     @override
     def recentre(self, platform: np.ndarray, carriers: np.ndarray) -> None:
-        places = np.split(
-            self.along(platform, carriers)[:, 0] ** 2, np.cumsum(MOST_TETHERS - self.tethers["cables"]), 1
-        )
+        ends = np.cumsum(MOST_TETHERS - self.tethers["cables"])
+        places = np.split(self.along(platform, carriers)[:, 0] ** 2, ends, 1)
         far = np.array([place.sum(axis=1).max() for place in places[:-1]])
         if (far > (LEAVES * self.tethers["farthest"]) ** 2).any():
             self.tethers = _tethers(self._model, platform[:, 0], carriers[:, :, 0])

@@ -280,8 +280,8 @@ class ComputedTorque(Controller):
             self._ahead.pass_time(dt, self._cables["last"])
             self._last = self._cables["last"].tobytes()
         observes = self._carried.is_later(seen)
+        fixed = dt, since if observes else 0.0, *scales, solves
         if time - seen <= ROUNDING and since == dt and observes:
-            fixed = dt, since, *scales, solves
             try:
                 done = control_step(*fixed, state, reference, *own, None, *self._arrays)
             except (ValueError, TypeError, BufferError):  # they need not be arrays of float64, which the core reads
@@ -297,13 +297,12 @@ class ComputedTorque(Controller):
             # more, ages that are not quite as told would make the loop unstable.
             share = min(since / age, 1.0) if age > ROUNDING else 1.0
             self._otherwise += share * (cables["known"] - cables["then"] - self._otherwise)
-            self._sent_lately.remember(self._last, dt)
+            self._sent_lately.remember(self._last, dt, state.tensions, reference.tensions)
             self._sent_lately.commanded(cables, age, since, dt, self._senses)
             models = self._carried.records_between(seen, time)
             memory = self._measured, self._otherwise, self._platform["disturbance"], self._accelerations
             late = self._sent_lately.move_on(age, models, *memory)
             seen_so = self._measured.copy() if late is None else late
-            fixed = dt, since if observes else 0.0, *scales, solves
             done = control_step(*fixed, None, None, *own, late if observes else seen_so, *self._arrays)
             self._late = seen_so
             if not observes:
@@ -367,10 +366,8 @@ class ComputedTorque(Controller):
             if lacking > self._negligible:
                 most = self._of_carriers["lacking"].max(axis=1)
                 lacks = (answered == PLANNED) & (most > self._negligible)
-                answered, proof = (
-                    np.where(lacks, SOFT, answered).astype(np.int8),
-                    (proof[0], np.where(lacks, most, proof[1])),
-                )
+                answered = np.where(lacks, SOFT, answered).astype(np.int8)
+                proof = proof[0], np.where(lacks, most, proof[1])
         tensions = self._sent(tensions)
         if self._are_far:
             answered = self._deviation.status(answered, self._measured[:, 0, :6], self._wanted[:, :6])

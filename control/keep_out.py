@@ -44,21 +44,19 @@ class Surroundings:
     def write(self, horizon: Any, states: np.ndarray, wanted: np.ndarray, penalty: float) -> None:
         """Write the rows about guessed states, with the cost per metre of violation [1/m]; both states (N + 1, n)."""
         poses = states[1:, :6]
-        index = 0
         if self._tube is not None:
             off = poses[:, :3] - wanted[1:, :3]
             size = np.linalg.norm(off, axis=1, keepdims=True)
             normals = np.where(size > 1e-9, off / np.maximum(size, 1e-9), [0.0, 0.0, 1.0])
             gradients = np.concatenate([normals, np.zeros_like(normals)], axis=1)
             limit = self._tube + np.einsum("ki,ki->k", normals, wanted[1:, :3])
-            self._put(horizon, index, gradients, limit, self._tube - size[:, 0], penalty)
-            index += 1
+            self._put(horizon, 0, gradients, limit, self._tube - size[:, 0], penalty)
         if not self._bodies:
             return
         points = placed(poses, self._points)  # (N, p, 3)
         turned = [placed(poses + STEP * unit, self._points) for unit in np.eye(6)[3:]]
         every = np.arange(len(poses))
-        for body in self._bodies:
+        for index, body in enumerate(self._bodies, self._tube is not None):
             distance, normals = _distance(body, points)
             nearest = distance.argmin(axis=1)
             distance, normals, point = distance[every, nearest], normals[every, nearest], points[every, nearest]
@@ -67,7 +65,6 @@ class Surroundings:
             # -n (p + dp) <= distance - n p
             limit = distance + np.einsum("ki,ki->k", gradients, poses)
             self._put(horizon, index, gradients, limit, distance, penalty)
-            index += 1
 
     def _put(
         self, h: Any, index: int, gradients: np.ndarray, limit: np.ndarray, room: np.ndarray, penalty: float

@@ -9,7 +9,7 @@ from ..core import control_move_on
 from .as_floats import ROUNDING
 from .command_delay import Pending
 
-OLDEST, PART = 0.25, 2e-3  # [s]: an older state is none; of the time since a state was measured
+OLDEST, PART = 0.25, 2e-3  # [s]: an older state is none; parts of the time since a state was measured
 
 
 class LateStates:
@@ -22,13 +22,18 @@ class LateStates:
     """
 
     def __init__(self, count: int):
-        self._commanded, self._begun = Pending(2 * OLDEST), False
+        self._commanded, self._begun, self._count = Pending(2 * OLDEST), False, count
         self._commanded.reset(count)
 
-    def remember(self, tensions: bytes, dt: float) -> None:
-        """Remember the tensions (N, m) of the last step, `dt` [s] ago."""
-        if dt > 0 and not self._begun:  # the first ones are taken for those of the time before
-            self._commanded.add(tensions)
+    def remember(self, tensions: bytes, dt: float, *before: np.ndarray | None) -> None:
+        """Remember the tensions (N, m) of the last step, `dt` [s] ago.
+
+        At the first step nothing is known but `before`, tensions (N, m) or (m,) that are measured or planned [N]. The
+        first ones without nan are taken for those of the time before, or those of the first step.
+        """
+        known = [np.resize(one, self._count).tobytes() for one in before if one is not None and np.isfinite(one).all()]
+        if not self._begun and (dt > 0 or known):
+            self._commanded.add(tensions if dt > 0 else known[0])
             self._commanded.wait(OLDEST)
             self._begun = True
         self._commanded.add(tensions)
@@ -40,10 +45,10 @@ class LateStates:
         `since` [s] is the time between the measurements of this step and of the last one, `dt` [s] that between the
         steps. Sensors report the tensions of one period, while observers need their mean since the last measurement.
         """
-        if dt > 0:
-            window = since if since > 0 else dt
+        if self._begun:
+            window = since if since > 0 else dt or PART
             cables["then"] = self._commanded.means(age + window, 1, window).reshape(cables.shape)
-            if window > dt:
+            if window > dt > 0:
                 cables["measured"] += cables["then"] - self._commanded.means(age + dt, 1, dt).reshape(cables.shape)
         if not senses:
             cables["measured"] = cables["then"]
@@ -57,7 +62,7 @@ class LateStates:
         disturbance: np.ndarray,
         accelerations: bytes,
     ) -> np.ndarray | None:
-        """Predict motions, (N, 1 + c, 12), over their `age` [s]; return them as measured if they are late.
+        """Predict motions, (N, 1 + c, 12), over their `age` [s]; return them as measured if they were predicted.
 
         - `age`, `motions`: motions that are too old become nan.
         - `models`: records of the robot, and how long each describes it [s], `age` in all.
@@ -65,7 +70,7 @@ class LateStates:
         - `disturbance`: estimated wrench of the disturbance, (N, 6) [N, N m].
         - `accelerations`: commanded accelerations of the carriers, (N, c, 6).
         """
-        if age <= ROUNDING:
+        if age <= ROUNDING or not (self._begun or age > OLDEST):
             return None
         late = motions.copy()
         if age > OLDEST:

@@ -62,11 +62,8 @@ class Preview:
 
         Raises `InputError` if an argument has a wrong type or value.
         """
-        if (
-            not isinstance(references, Sequence)
-            or not references
-            or not all(isinstance(r, Reference) for r in references)
-        ):
+        is_list = isinstance(references, Sequence) and all(isinstance(each, Reference) for each in references)
+        if not (is_list and references):
             raise InputError(f"references must be a list of References, got {shown(references)}")
         period, start = number("period", period, 1e-9, 1e6), number("start", start, -1e9, 1e9)
         with np.errstate(invalid="ignore"):  # of angles that are infinite: the step holds what it has

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from towline import load, plan, simulate
-from towline.control import ComputedTorque, Predictive
+from towline import load, plan, simulate, tensions
+from towline.control import ComputedTorque, Predictive, Reference, State
 from towline.models import Robot
 
 LATE = {"delay": 0.02, "stamped": True}
@@ -44,3 +44,21 @@ def test_a_lost_rotor_is_noticed_within_fifty_milliseconds_and_the_delay():
     noise = LATE | {"delay": 0.01}
     run = simulate(robot, robot.home, Predictive(robot), duration=0.2, events=["lose quad1 at 0.1"], noise=noise)
     assert 0.11 < run.handed_over <= 0.16
+
+
+@pytest.mark.parametrize("known", ["measured", "planned", "neither"])
+@pytest.mark.parametrize("make", [ComputedTorque, Predictive])
+def test_a_first_state_that_is_late_is_not_that_of_a_falling_robot(make, known):
+    robot = load("wang-flying")
+    rest = tensions(robot, robot.home).tensions
+    still, nothing = np.zeros_like(robot.carrier_home), np.zeros(6)
+    state = State(robot.home, nothing, robot.carrier_home, still, rest if known == "measured" else None)
+    planned = None if known == "neither" else rest
+    reference = Reference(robot.home, nothing, nothing, robot.carrier_home, still, still, planned)
+    now = make(robot)
+    same = [now.step(time, state, reference).tensions for time in (1.0, 1.01, 1.02)]
+    for late in (make(robot), make(robot, sensors={"delay": 0.03})):
+        for step, time in enumerate((1.0, 1.01, 1.02)):
+            seen = None if late._known_age else time - 0.03
+            command = late.step(time, state._replace(time=seen), reference)
+            assert np.abs(command.tensions - same[step]).max() < 1e-3 * robot.force_scale
