@@ -138,8 +138,8 @@ def test_standard_deviations_hold(known):
     ],
 )
 def test_gauges_are_counted_and_named(free, known, gauges):
-    built = as_built(80, 0, offsets=0.05 if "offsets" in free else 0.0)
-    result = calibrate("cogiro", built.measurements(known), free)
+    built = as_built(80, 0, noise=NOISE / 4, offsets=0.05 if "offsets" in free else 0.0)
+    result = calibrate("cogiro", built.measurements(known, sigma=NOISE / 4), free)
     assert result.converged
     assert len(result.not_identifiable) == gauges
     expected = [f"all anchors together {how} {axis} of {{G}}" for how in ("along", "about") for axis in "xyz"]

@@ -239,3 +239,24 @@ def test_a_large_robot_is_known_as_well_as_its_log_tells():
     error = known.parameter_values(names) - truth
     assert 0.08 < np.sqrt(np.diag(covariance)).max() < 0.3
     assert error @ np.linalg.solve(covariance, error) < chi2.ppf(0.999, len(error)), error
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_lengths_alone_of_a_large_robot_are_believed_as_far_as_they_tell(seed):
+    """A fit without poses may go tens of metres along directions that hardly change a length, and these bend."""
+    data, draw = load("point-mass-3").model_dump(mode="json"), np.random.default_rng(seed)
+    data["platform"]["home"] = [0, 0, 15, 0, 0, 0]
+    corners = [[100, 65, 45], [-100, 65, 45], [-100, -65, 45], [100, -65, 45]]
+    data["cables"] = [{**data["cables"][0], "anchor": corner} for corner in corners]
+    robot = Robot.model_validate(data)
+    built, offsets = moved_anchors(robot, draw, 0.3), draw.normal(0, 0.3, robot.m)
+    poses = robot.home + draw.uniform(-1, 1, (120, 6)) * [50, 30, 12, 0, 0, 0]
+    readings = Dynamics(built).cable_lengths(poses) - offsets + draw.normal(0, 0.02, (120, robot.m))
+    found = calibrate(robot, Measurements(readings, sigma=0.02), outliers=False)
+    truth = np.hstack([built.anchors, offsets[:, None]]).ravel()
+    error = np.array([one.value for one in found.parameters]) - truth
+    values, vectors = np.linalg.eigh(found.covariance)
+    known = values > 1e-12 * values[-1]
+    assert known.sum() >= 4
+    assert (error @ vectors[:, known]) ** 2 @ (1 / values[known]) < chi2.ppf(0.999, known.sum()), error
+    assert np.abs(error).max() < 1.5  # of files that are wrong by 0.3 m, one standard deviation

@@ -58,8 +58,8 @@ def observability(
     - `length`: length of the cables [m].
     - `kept`: rows of all parameters along which the file's values were kept, (d, P).
     """
-    held = np.linalg.qr((kept / scale)[:, parameters.varies].T)[0]
-    across = np.eye(len(S)) - held @ held.T
+    held = (kept / scale)[:, parameters.varies]
+    across = np.eye(len(S)) - np.linalg.pinv(held, rcond=SAME) @ held
     S, B = across @ S @ across, across @ B @ across
     values, vectors = np.linalg.eigh(S)
     fixed = values > unobservable_below(values, length)

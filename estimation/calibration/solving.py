@@ -27,11 +27,12 @@ from .parameters import IN_BALANCE, Parameters
 from .pose_noise import keeping, observed
 from .projection import out_of_plane
 from .sightings import sighted
-from .starts import fit_from, level_poses
+from .starts import NEAR_THE_FILE, fit_from, level_poses
 
 WINDING = 10.0  # standard deviations of readings that change, and so show a clock offset
 LOOSE, LOOSE_SHARE = 0.1, 0.03  # [m] of standard deviation, and share of the cables' length: files are usually better
 FEWEST_KNOWN, MEDIAN = 3, 0.455  # directions whose changes show the file's errors; median of chi-square with 1 degree
+ROUNDING = 1e-13  # of the largest variance: a direction without any is unobservable, or kept already
 NEARLY_LOOSE = 0.01  # of the variance, below which residuals are never large enough to make it so large
 ROUNDS = 30  # of fits, each without the wrong readings of those before
 FEW = 0.02  # of the samples
@@ -146,28 +147,35 @@ def _determined(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
     a prior, which would hold them. The limit is larger if changes along the other directions show larger errors of the
     file, as of large robots.
     """
-    of = model.parameters
+    of, scale = model.parameters, metric(model)
     lengths = np.flatnonzero(np.array(of.units)[of.varies] == "m")
     lengths = lengths[np.flatnonzero(of.varies)[lengths] < of.clock]
     block, limit = np.ix_(lengths, lengths), min(LOOSE, LOOSE_SHARE * length) ** 2
-    for _ in range(0 if model.prior or not lengths.size else ROUNDS_OF_WEIGHTS):
-        seen = observed(model, result.state, length)
-        if np.linalg.eigvalsh(seen.covariance[block])[-1] < NEARLY_LOOSE * limit:
-            break
-        values, vectors = np.linalg.eigh(noise_of(Solved(model, result, (), (), seen)).covariance[block])
-        away = ((result.state.x - of.first) * metric(model))[of.varies][lengths] @ vectors
-        known = values <= limit
-        shown = float(np.median(away[known] ** 2 - values[known])) / MEDIAN if known.sum() >= FEWEST_KNOWN else 0.0
-        far = values > max(limit, shown)
-        if away[far] @ away[far] <= limit:
-            break  # about where the file has them
-        kept, state = keeping(model, result.state, np.eye(len(seen.covariance))[:, lengths] @ vectors[:, far])
-        found, scale = fit(kept, state, length), metric(model)
-        before, after = (np.linalg.norm((one.state.x - of.first) * scale) for one in (result, found))
-        if after > before or not found.converged or (of.table(found.state.x)[:, 8] < 0).any():
-            break
-        model, result = kept, found
-    return model, result
+    seen = None if model.prior or not lengths.size else observed(model, result.state, length)
+    if seen is None or np.linalg.eigvalsh(seen.covariance[block])[-1] < NEARLY_LOOSE * limit:
+        return model, result
+
+    def directions(of_fit: Fit, seen: Observability) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        values, vectors = np.linalg.eigh(noise_of(Solved(model, of_fit, (), (), seen)).covariance[block])
+        return values, vectors, ((of_fit.state.x - of.first) * scale)[of.varies][lengths] @ vectors
+
+    values, _, away = directions(result, seen)
+    if (away[values > limit] ** 2).sum() <= limit:
+        return model, result  # about where the file has them
+    # A fit may have gone so far that derivatives there are not those near the file.
+    near = fit(replace(model, prior=dict.fromkeys(NEAR_THE_FILE.keys() & of.groups, limit**0.5)), result.state, length)
+    near = near._replace(cost=model.cost(near.state))
+    values, vectors, away = directions(near, observed(model, near.state, length))
+    unseen = values <= ROUNDING * values[-1]
+    known = (values <= limit) & ~unseen
+    shown = float(np.median(away[known] ** 2 - values[known])) / MEDIAN if known.sum() >= FEWEST_KNOWN else 0.0
+    # Unobservable directions are straight lines only nearby, so a fit could go far along them.
+    still = (values > max(limit, shown)) | unseen
+    kept, state = keeping(model, near.state, np.eye(len(seen.covariance))[:, lengths] @ vectors[:, still])
+    found = fit(kept, state, length)
+    before, after = (np.linalg.norm((one.state.x - of.first) * scale) for one in (result, found))
+    sound = after <= before and found.converged and not (of.table(found.state.x)[:, 8] < 0).any()
+    return (kept, found) if sound else (model, result)
 
 
 def _with_slip(model: Model, result: Fit, slip: Slip, length: float) -> tuple[Model, Fit, np.ndarray]:
