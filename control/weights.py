@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.tolerances import INDEPENDENT
 from ..core import control_stages
 from ..models.dynamics import dynamics_of
 from ..models.record import record_of
@@ -14,7 +15,6 @@ from .settings import Limits
 
 SHARE = 0.05  # of the robot's scale of forces: the tension that costs as much as a carrier at the end of its reach
 ROOM = 1e-3  # of its upper limit: what a tension is taken to be from limits
-SINGULAR = 1e-3  # of the largest singular value: directions with less are not controlled by tensions
 ROUNDS = 2000  # of the Riccati recursion
 SETTLED = 1e-9  # relative change at which it ends
 DISCOUNT = 0.95  # of the cost of each stage, if it does not settle without
@@ -49,7 +49,7 @@ def weights(
         A = np.concatenate([A, M @ moved / np.sqrt(far)], axis=1)
     U, sizes, _ = np.linalg.svd(A)
     sizes = np.concatenate([sizes, np.zeros(6)])[:6]
-    held = sizes > SINGULAR * sizes[0]
+    held = sizes > INDEPENDENT * sizes[0]
     effort = (U[:, held] / sizes[held]).T @ (M * robot.dof_mask)  # least tensions for unit accelerations
     of_acceleration = np.einsum("ij,ij->j", effort, effort)
     pose, rate = bandwidth**4 * of_acceleration, 2 * bandwidth**2 * of_acceleration
@@ -80,7 +80,7 @@ def ripple(robot: Robot, limits: Limits, bandwidth: np.ndarray) -> np.ndarray | 
     if best is None:
         return None
     A, M = _at_home(robot)
-    asked = np.linalg.pinv(A, SINGULAR) @ (M * robot.dof_mask) * bandwidth
+    asked = np.linalg.pinv(A, INDEPENDENT) @ (M * robot.dof_mask) * bandwidth
     room = np.minimum(best - limits.low, limits.high - best)
     return asked / np.maximum(room, ROOM * limits.high)[:, None]
 

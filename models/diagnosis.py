@@ -6,11 +6,12 @@ import numpy as np
 
 from ..base.display import Displayed
 from ..base.text import quantity, quantity_row
+from ..base.tolerances import INDEPENDENT
 from .dynamics import Dynamics
 from .files import AnyRobot
 from .robot import Robot
 
-RANK_TOLERANCE = 1e-9  # of the largest singular value; exact singularities come out near 1e-16
+RANK_TOLERANCE = 1e-9  # of the largest value, where cables are parallel or meet; that comes out near 1e-16
 LEVEL_POSES = 50
 
 
@@ -45,7 +46,7 @@ def diagnose(robot: AnyRobot) -> Diagnosis:
     turned = levels.copy()
     turned[:, 3:] = robot.dof_mask[3:] * rng.uniform(-0.3, 0.3, size=(LEVEL_POSES, 3))
     rank, level, tilted = (
-        int(np.linalg.matrix_rank(dynamics.wrench_matrix(poses) * scale * rows, rtol=RANK_TOLERANCE).max())
+        int(np.linalg.matrix_rank(dynamics.wrench_matrix(poses) * scale * rows, rtol=INDEPENDENT).max())
         for poses in (robot.home, levels, turned)
     )
     reason = _why(robot, A, rank, lengths) if rank < len(robot.platform.dof) else ""

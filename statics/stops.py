@@ -223,8 +223,7 @@ class _Limits:
         floor, after = np.zeros(len(self._rows.falls)), 0.0
         if not self._goes_on or self._rows.can_rest.all():
             return floor
-        ranges = np.array([self._rows.range_of(np.full_like(floor, x)) for x in LEVELS])
-        least, most = ranges[:, 0], ranges[:, 1]
+        least, most = np.array([self._rows.range_of(np.full_like(floor, x)) for x in LEVELS]).swapaxes(0, 1)
         free = most - least
         needed = np.clip(free[-1], 0.0, ROOM)  # where u has no room, no step ends
         for at in range(len(floor) - 1, -1, -1):
@@ -242,8 +241,7 @@ class _Limits:
         least, most = _Bounds(*(part[k : k + 3] for part in self._rows)).range_of(np.full(3, rate * rate))
         low, high = float(least.max()), float(most.min())
         if low > high:  # none is possible: of those between, the one nearest to the rate of now
-            u = min(max(0.0, high), low)
-            return u, u
+            return (min(max(0.0, high), low),) * 2
         floor = float(self._lowest[k + 2])
         if floor > 0:  # reached in time, from one to two instants before
             low = min(max(low, (floor - rate * rate) / (2 * self._apart * (k + 2 - place))), high)
@@ -344,14 +342,15 @@ def _braking(limits: _Limits) -> _Law:
 
 
 def _planned(trajectory: Trajectory, begins: float, end: float) -> _Law | None:
-    """Return the plan's own law until it rests, which brakes hardest if it is the fastest; None if it moves on."""
+    """Return the plan's own law until it rests, soon or at its end, which brakes hardest if it is fastest; or None."""
     early, late = begins, min(begins + WINDOW, end)
     for _ in range(3):  # at a corner the platform rests for an instant
-        tau = np.linspace(early, late, 1000)
+        tau = np.append(np.linspace(early, late, 1000), end)
         speed = np.max([np.abs(motion[1]).reshape(len(tau), -1).max(axis=1) for motion in trajectory.at(tau)], axis=0)
-        rests, near = float(tau[speed.argmin()]), tau[1] - tau[0]
-        early, late = max(rests - near, begins), min(rests + near, end)
-    if speed.min() > RESTS or rests - begins < STEP:
+        soon, near = int(speed[:-1].argmin()), tau[1] - tau[0]
+        early, late = max(tau[soon] - near, begins), min(tau[soon] + near, end)
+    rests = float(tau[soon if speed[soon] <= RESTS else -1])
+    if min(speed[soon], speed[-1]) > RESTS or rests - begins < STEP:
         return None
     tau = np.linspace(begins, rests, int((rests - begins) / STEP) + 2)
     return _Law(tau - begins, tau, np.ones_like(tau), np.zeros_like(tau))
@@ -389,10 +388,11 @@ def _audited(robot: Robot, trajectory: Trajectory, laws: list[_Law]) -> Iterator
     tensions = solve_batch(A, w, robot.t_min, robot.t_max, t_ref=near, length=robot.length, rho=RHO).tensions
     missing = np.linalg.norm((w - (A @ tensions[:, :, None])[..., 0]) * robot.wrench_scale, axis=1) / robot.force_scale
     lengths, last = dynamics.cable_lengths(platform[0], carriers[0]), 0
+    most = LITTLE if robot.m < len(robot.platform.dof) else MISSING  # few cables: as much as plans may miss
     for own in laws:
         some = slice(last, last := last + len(own.times))
         at = some.start + int(np.argmax(missing[some]))
-        worst = wrench_problem(robot, A[at], w[at]) if missing[at] > MISSING else None
+        worst = wrench_problem(robot, A[at], w[at]) if missing[at] > most else None
         limit = overloaded_winch(robot, own.times, lengths[some], tensions[some])
         body, bases = ((x[some], v[some], a[some]) for x, v, a in (slowed, moved))
         found = Stop(robot, float(own.tau[0]), float(own.tau[-1]), own.times, body, bases, tensions[some], None, limit)

@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 from scipy.sparse import block_diag
 from scipy.spatial import KDTree
 
-from towline import Dynamics, InputError, Planner, export_fmu, load, plan, simulate
+from towline import Dynamics, InputError, Planner, Robot, export_fmu, load, plan, simulate
 from towline.control import Predictive, Stop, longest_stop, references, stop
 from towline.models.parsing import to_yaml
 from towline.ocp.search import stops_within
@@ -328,6 +328,31 @@ def test_flying_carriers_are_refused():
     )
     with pytest.raises(InputError, match="carriers of kind ground, prescribed or mobile, got 'wang-flying-quadrotor'"):
         stop(found, 0.5)
+
+
+def test_a_swinging_load_on_one_cable_follows_its_plan_to_the_end():
+    """The cable has the direction of the planned acceleration less gravity, so no other rate balances the load."""
+    limits = {"reach": {"min": [-9] * 3, "max": [9] * 3}, "speed_max": 9, "acceleration_max": 90}
+    trolley = {"name": "trolley", "kind": "mobile", "home": [0, 0, 2, 0, 0, 0], **limits}
+    cable = {"carrier": "trolley", "anchor": [0, 0, 0], "attachment": [0, 0, 0], "t_min": 1, "t_max": 500}
+    body = {"mass": 10, "home": [0] * 6, "dof": ["x", "y", "z"]}
+    robot = Robot.model_validate(
+        {"name": "pendulum", "source": "a test", "platform": body, "carriers": [trolley], "cables": [cable]}
+    )
+    t, along = np.linspace(0, 2, 4001), np.polynomial.Polynomial([0, 0.5])
+    way = np.polynomial.Polynomial([0] * 5 + [126, -420, 540, -315, 70])(along)
+    platform, trolleys = np.zeros((3, len(t), 6)), np.zeros((3, len(t), 1, 6))
+    for k, motion in enumerate(platform):
+        motion[:, 0] = way.deriv(k)(t)
+    force = np.column_stack([platform[2, :, 0], np.zeros(len(t)), np.full(len(t), 9.81)])
+    tensions = 10 * np.linalg.norm(force, axis=1)[:, None]
+    trolleys[0, :, 0, :3] = platform[0, :, :3] + 20 * force / tensions
+    for k in (1, 2):
+        trolleys[k] = np.gradient(trolleys[k - 1], t, axis=0)
+    plan_of_it = Stop(robot, 0.0, 2.0, t, tuple(platform), tuple(trolleys), tensions, None)
+    halt = stop(plan_of_it, 1.0)
+    assert halt.feasible, halt
+    assert (halt.ends, halt.duration) == pytest.approx((2.0, 1.0))
 
 
 def test_a_stop_carries_the_load_of_its_phase(tmp_path):

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...base.display import Displayed
+from ...base.tolerances import INDEPENDENT
 from ...solvers import Certificate
 from ..tasks.deviation import Deviation
 from ..tasks.paths import Motion
@@ -22,7 +23,7 @@ from .drift import Drift, drift
 from .excess import TENSIONS, Excess
 from .instants import instants, limited
 from .peaks import with_peaks
-from .tensions import INDEPENDENT, scaled, tolerance_of
+from .tensions import scaled, tolerance_of
 
 
 @dataclass(frozen=True)

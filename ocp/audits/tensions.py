@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...base.tolerances import INDEPENDENT
 from ...models import Robot
 from ...solvers import Certificate, TensionProblem, certify, solve, solve_batch
 from ...statics.distribution import wrench_problem
@@ -21,8 +22,7 @@ from ..tasks.wind_set import WindBox, WindSet, as_wind, decisive_winds_at, possi
 
 TOLERANCE = 1e-6  # [N], and of the characteristic force of robots below 1 N
 UNDERACTUATED_TOLERANCE = 1e-3  # of the weight, for robots with fewer independent cables than degrees of freedom
-INDEPENDENT = 1e-3  # of the largest singular value: along less the cables give nothing worth counting on
-RANK = 1e-9  # the same, below which nothing is given
+RANK = 1e-9  # of the largest singular value: along less nothing is given
 EXACT = 1e-12  # relative, of the wrench: tensions by pseudo-inverse that miss more are solved for again
 NEAREST = 1e10  # weight of the wrench error beside the tensions: so large that these do not shift it
 INNER_WINDS = 8  # of a box, at each instant others

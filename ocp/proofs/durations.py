@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.text import quantity
+from ...base.tolerances import INDEPENDENT
 from ...solvers import solve_batch
-from ..audits.tensions import INDEPENDENT
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 

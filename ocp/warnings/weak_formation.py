@@ -3,13 +3,13 @@
 import numpy as np
 
 from ...base.text import quantity
+from ...base.tolerances import INDEPENDENT
 from ...solvers.certificate import direction_text
 from .instants import Instants
 
 WEAK = 0.05  # of the smallest singular value at home
 LEAST = 1e-4  # smaller shares are reported as less than this
 SMALLER = 0.3  # of the formation, as advice
-NONE = 1e-3  # of the largest one at home; a smaller one does not count
 
 
 def weak_formation(seen: Instants, formation: float | None = None) -> list[str]:
@@ -22,9 +22,9 @@ def weak_formation(seen: Instants, formation: float | None = None) -> list[str]:
     rows = np.flatnonzero(robot.dof_mask)
     scale = np.repeat([1.0, 1.0 / robot.length], 3)[rows, None]
     at_home = np.linalg.svd(scale * seen.dynamics.wrench_matrix(robot.home)[rows], compute_uv=False)
-    rank = int((at_home > NONE * at_home[0]).sum())
+    rank = int((at_home > INDEPENDENT * at_home[0]).sum())
     U, values, _ = np.linalg.svd(scale * seen.dynamics.wrench_matrix(seen.pose, seen.carriers)[:, rows])
-    lost = rank < len(rows) <= robot.m and values[:, -1].min() <= NONE * at_home[0]
+    lost = rank < len(rows) <= robot.m and values[:, -1].min() <= INDEPENDENT * at_home[0]
     last = values.shape[1] - 1 if lost else rank - 1
     k, direction = int(values[:, last].argmin()), np.zeros(6)
     direction[rows], share = U[k, :, last], values[k, last] / at_home[last]
