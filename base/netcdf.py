@@ -129,7 +129,7 @@ def load_netcdf(path: Path, refusal: str) -> xr.Dataset:
                     check_hdf5(file, size)
                     with warnings.catch_warnings():
                         warnings.simplefilter("ignore")  # of what is unusual; whoever uses it checks what matters
-                        opened = h5netcdf.File(file, "r", decode_vlen_strings=True)
+                        opened = h5netcdf.File(file, "r", decode_vlen_strings=True, phony_dims="access")
                         return xr.load_dataset(xr.backends.H5NetCDFStore(opened))
             except Exception as error:  # it may fail at any place of three libraries
                 # HDF5 has its own message of several lines, where others have a few words.

@@ -252,7 +252,7 @@ def test_a_clock_offset_moves_carriers_too():
     slope = (more.readings - less.readings) / 2e-5
     np.testing.assert_allclose(derivatives.others[:, inside, 0], slope[:, inside], atol=1e-2 * np.abs(slope).max())
     slope = (more.directions - less.directions) / 2e-5
-    found = derivatives.directions.clock
+    found = derivatives.directions.robot[..., 0]
     np.testing.assert_allclose(found[:, inside], slope[:, inside], atol=1e-2 * np.abs(slope).max())
 
 
