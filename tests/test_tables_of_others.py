@@ -133,3 +133,47 @@ def test_positions_without_spikes():
         stops = np.concatenate([part for way in there for part in (way, np.repeat(way[-1:], rate, axis=0))])
         assert not spikes(stops + draw.normal(0, 1e-3, stops.shape)).any()
         assert not spikes(draw.uniform(-1, 1, (27, 3))).any()
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("Length B [mm]", "Length A [mm]", "Force B", "Force A"),
+        ("len_FL_mm", "len_RR_mm", "tension_FL", "tension_RR"),
+        ("front_left_cable_length_mm", "front_right_cable_length_mm", "front_left_force", "front_right_force"),
+    ],
+)
+def test_cables_named_by_letters_and_corners(names, tmp_path):
+    """Letters are in the order of the alphabet, and corners in that of the columns, which is noted."""
+    order, lettered = ((1, 0), True) if "A" in names[1] else ((0, 1), False)
+    user.write(tmp_path / "log.csv", ["t", *names], np.column_stack([T, 1e3 * LENGTHS, 10 * LENGTHS]), form="%.12g")
+    read = read_log(tmp_path / "log.csv")
+    np.testing.assert_allclose(read.measurements.lengths, LENGTHS[:, order], atol=1e-9)
+    np.testing.assert_allclose(read.measurements.tensions, 10 * LENGTHS[:, order], atol=1e-9)
+    noted = f"in the order of the cables: {', '.join(names)}".replace(" [mm]", "")
+    assert any(noted in note for note in read.notes) != lettered
+
+
+def test_no_other_words_are_corners():
+    """Axes of a force sensor, statistics, joints of an arm and the unit of a single length."""
+    for name in ("force_x", "length_mm", "length_std", "force_ref", "/joint_states/position[left_arm]", "length_set"):
+        assert role(name) is None or role(name).role not in ("lengths", "tensions")
+    assert role("cable_1_length_mm").which == "1"
+    assert role("/joint_states/position[winch_rear_left]").which == "rear_left"
+
+
+def test_numbered_columns_of_two_meanings(tmp_path):
+    """Columns such as q_1 may be lengths or a quaternion: the refusal says what a map must name."""
+    names = ["q_meas_1", "q_meas_2", "q_meas_3", "q_meas_4", *"xyz", *(f"plat_q{k}" for k in range(1, 5))]
+    turns = np.tile([0.6, 0.0, 0.0, 0.8], (len(T), 1))
+    table = np.column_stack([T, LENGTHS, LENGTHS + 1, LENGTHS, T, turns])
+    user.write(tmp_path / "log.csv", ["t", *names], table, form="%.12g")
+    for text, asked in (("", "'lengths: q_meas_*'"), ("lengths: q_meas_*\n", "'orientation: [...]'")):
+        (tmp_path / "map.yaml").write_text(text + "time: t\n")
+        with pytest.raises(InputError, match=r"may be lengths or a quaternion: a map \(--fields\) must say") as refused:
+            read_log(tmp_path / "log.csv", fields=tmp_path / "map.yaml")
+        assert asked in str(refused.value)
+    (tmp_path / "map.yaml").write_text("lengths: q_meas_*\norientation: [plat_q1, plat_q2, plat_q3, plat_q4]\n")
+    read = read_log(tmp_path / "log.csv", fields=tmp_path / "map.yaml").measurements
+    np.testing.assert_allclose(read.lengths, table[:, 1:5])
+    np.testing.assert_allclose(read.poses[:, 3], 2 * np.arctan2(0.6, 0.8))

@@ -90,6 +90,12 @@ def test_rests_with_an_ahrs_and_load_cells(tmp_path):
         value, sigma = values[f"cables[{i}].offset"]
         assert abs(value - offsets[i]) < 4 * sigma
         assert sigma < 6e-3
+    exact = "hold only if the file's anchors are exact; with --free anchors,offsets --prior anchors=0.02 they include"
+    text = (tmp_path / robot).read_text()
+    for uncertain in ("", "uncertainty: {parameters: ['cables[0].anchor.x'], covariance: [[1.0e-4]]}\n"):
+        (tmp_path / "uncertain.yaml").write_text(text + uncertain)
+        read = read_measurements(tmp_path / "statics.csv", robot=tmp_path / "uncertain.yaml")
+        assert (exact in calibrate(tmp_path / "uncertain.yaml", read, ["offsets"]).report()) == (not uncertain)
     said = towline("pose", "hanging-calibrated.yaml", "--log", "statics.csv", cwd=tmp_path).stdout
     assert "times as large as stated" not in said
     poses = np.loadtxt(tmp_path / "statics-poses.csv", delimiter=",", skiprows=1)

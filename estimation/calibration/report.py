@@ -12,6 +12,7 @@ from ...models.parsing import to_yaml
 from .file_errors import ENDS
 from .geometry import length_of
 from .left_out import left_out
+from .parameters import GROUPS
 from .result import CalibrationData, Parameter
 from .solving import is_still
 from .turning import turning
@@ -60,16 +61,14 @@ def facts(result: CalibrationData) -> list[Fact]:
     residual = f"{_mm(result.residual_before)} before, {_mm(result.residual_after)} after (rms)"
     doubt = [] if result.doubt is None else [("DO NOT USE", result.doubt)]
     by_size = sorted(result.parameters, key=lambda one: -abs(one.correction))
+    shown = map(_one, by_size[:MOST_LISTED])
     counts = (("wrong readings", result.outliers), ("slips", result.slips), ("unobservable", result.not_identifiable))
     return [
         *doubt,
         ("residual of the lengths", residual),
         *((name, quantity(len(of))) for name, of in counts if of),
         ("parameters", quantity(len(by_size))),
-        *(
-            (name, f"{value} +- {sigma} change {change}")
-            for name, value, sigma, change in map(_one, by_size[:MOST_LISTED])
-        ),
+        *((name, f"{value} +- {sigma} change {change}") for name, value, sigma, change in shown),
     ]
 
 
@@ -117,13 +116,15 @@ def _of_noise(result: CalibrationData) -> list[str]:
             f"{what} was found from the file's {end}, which are taken to be {size}: the standard deviations below "
             "include its error"
         )
-    kept = {"anchors", "offsets"} - set(result.free)
-    if len(kept) == 1 and is_still(result.measurements):
-        name = kept.pop()
+    kept = [name for name in ("anchors", "offsets") if name not in result.free]
+    still, uncertainty = len(kept) == 1 and is_still(result.measurements), result.file.uncertainty
+    known = "frame" in result.free or (uncertainty and any(".anchor." in name for name in uncertainty.parameters))
+    if still or (kept[:1] == ["anchors"] and result.free and not known):
+        why = "the lengths hardly change, so they do not distinguish offsets from anchors: " * still
+        free = ",".join(name for name in GROUPS if name in (kept[0], *result.free))
         lines.append(
-            "the lengths hardly change, so they do not distinguish offsets from anchors: the standard deviations below "
-            f"hold only if the file's {name} are exact; with --free anchors,offsets --prior {name}=0.02 they include "
-            "errors of 20 mm"
+            f"{why}the standard deviations below hold only if the file's {kept[0]} are exact; with --free {free} "
+            f"--prior {kept[0]}=0.02 they include errors of 20 mm"
         )
     turns = turning(result.file, result.measurements) if "attachments" in result.free else None
     if turns is not None and not turns.enough:

@@ -42,9 +42,8 @@ def unrolled(readings: np.ndarray) -> tuple[np.ndarray, list[int]]:
         whole = float(np.ptp(y)) if len(y) > 2 else 0.0
         jumps = np.flatnonzero(np.abs(steps) > ROLLED * whole)
         smooth = np.delete(steps, jumps)
-        if not jumps.size or not smooth.size or np.abs(smooth).max() > END * whole:
-            continue
-        if not (y[jumps] * y[jumps + 1]).any():  # zeros of readings that are missing
+        missing = not (y[jumps] * y[jumps + 1]).any()  # readings, which are zeros
+        if missing or not smooth.size or np.abs(smooth).max() > END * whole:
             continue
         around = 0.5 * (steps[np.maximum(jumps - 1, 0)] + steps[np.minimum(jumps + 1, len(steps) - 1)])
         periods = np.abs(steps[jumps] - np.where(np.abs(around) > END * whole, 0.0, around))

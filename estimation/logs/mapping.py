@@ -15,7 +15,7 @@ from ...base.inputs import file_path
 from ...models.parsing import read_yaml
 from ...models.part import COORDINATES, Part
 from ...models.robot import Robot
-from .names import ANGLE_OF, TURNED, UNITS, Role, measured_name, role, unit_of
+from .names import ANGLE_OF, LETTERS, TURNED, UNITS, Role, corner, measured_name, role, unit_of
 from .recording import Recording, Topic, plain
 
 AXES = {"position": ("x", "y", "z"), "quaternion": ("x", "y", "z", "w"), "angles": ("roll", "pitch", "yaw")}
@@ -104,16 +104,12 @@ def fields_of(
 ) -> Fields:
     """Return the fields of logs: those that a map names, and for all other roles those with usual names.
 
-    Args:
-        recordings: The logs.
-        given: Names of the fields; default: the usual ones.
-        m: Number of cables, which decides among several candidates.
-        carriers: Names of carriers, whose poses are not the platform's.
-        free: `free_axes` of the robot.
+    - `m`: number of cables, which decides among several candidates.
+    - `carriers`: names of carriers, whose poses are not the platform's.
+    - `free`: `free_axes` of the robot.
 
-    Raises:
-        InputError: If a field that the map names does not exist, part of a position or an orientation is missing, or
-            there are several candidates.
+    Raises `InputError` if a field that the map names does not exist, part of a position or an orientation is missing,
+    or there are several candidates.
     """
     roles = ("lengths", "tensions", "position", "orientation", "directions")
     found = {name: _named(recordings, name, given, free) for name in roles} if given else {}
@@ -142,13 +138,10 @@ def command_fields(
 
     Raises `InputError` as `fields_of`.
     """
-    roles = ("commands", "thrusts")
-    found = {name: _named(recordings, name, given) for name in roles} if given else {}
-    everything = _everything(recordings)
-    alone = _everything(recordings, [_prefix(given, name) for name in carriers])
-    for name in (*roles, "efforts"):
-        if not found.get(name):
-            found[name] = _usual(alone if name == "thrusts" else everything, name, m, ())
+    found = {name: _named(recordings, name, given) for name in ("commands", "thrusts")} if given else {}
+    for name, but in {"commands": (), "thrusts": carriers, "efforts": ()}.items():
+        fields = _everything(recordings, [_prefix(given, one) for one in but])
+        found[name] = found.get(name) or _usual(fields, name, m, ())
     return Fields(**found, time=_times(recordings, given))
 
 
@@ -263,6 +256,9 @@ def _usual(
             named = kind != "thrust_vectors" and not greek and set(by_name) <= set(AXES[kind])
             if missing and named and not members[0][1].topic.name:
                 names = ", ".join(one.full for _, one in members)
+                if kind == "quaternion" and "w" in missing and members[0][1].full.endswith("1"):  # q1, q2, q3, q4
+                    how = f"'lengths: {members[0][1].full[:-1]}*' or 'orientation: [...]' with the names of x, y, z, w"
+                    raise InputError(f"{names}, ... may be lengths or a quaternion: a map (--fields) must say {how}")
                 wanted = ", ".join(_like(members[0], axis) for axis in axes)
                 raise InputError(f"must have all columns {wanted} or none of them, got {names}")
             complete += [] if missing else [tuple(by_name[axis] for axis in axes)]
@@ -274,7 +270,14 @@ def _usual(
                 raise InputError(f"must have directions with the same axes for each cable, got {names}")
             complete.append(tuple(by_name[which] for which in order))
         else:
-            order = sorted(by_name, key=lambda which: int(which or 0))
+            letters = [which for which in by_name if which and not which.isdigit()]
+            if len(letters) == len(by_name):
+                in_order = set(letters) == set(LETTERS[: len(letters)])
+                known = in_order or all(corner(one.full) for one in by_name.values())
+                if known and len(letters) == (m or max(len(letters), 2)):
+                    complete.append(tuple(by_name[which] for which in (sorted(letters) if in_order else letters)))
+                continue
+            order = sorted(set(by_name) - set(letters), key=lambda which: int(which or 0))
             first, count = int(order[0] or 0), len(order)
             wanted = [str(i) for i in range(min(first, 1), min(first, 1) + count)]
             lone = count == 1 and what == "thrusts"  # thrust_body[2], of PX4
@@ -290,6 +293,7 @@ def _usual(
             complete.append(tuple(by_name[i] for i in order))
     better: tuple[tuple[str, Callable[[tuple[Field, ...]], bool]], ...] = (
         ("lengths tensions commands", lambda one: m is None or len(one) == m),
+        ("lengths tensions commands", lambda one: not corner(one[0].full)),
         ("lengths", lambda one: not BEHIND_NUMBER.search(one[0].full)),  # winch_1 rather than pulley_1_joint
         ("lengths tensions directions thrusts thrust_vectors", lambda one: measured_name(one[0].full) is None),
         ("lengths", lambda one: not re.search(TURNED, one[0].full.lower())),  # l1 rather than angle_1

@@ -1,6 +1,7 @@
 """The usual names of what robots record: `role` of a field, and the units of each role."""
 
 import re
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -110,6 +111,16 @@ PATTERNS = {
         "([mun]s(?:ec)?)",
     ),
 }
+# Corners and letters instead of numbers: Length A, len_FL, front_left_length, position[winch_rear_right].
+_CORNER = r"((?:(?:front|rear|back|left|right|upper|lower|top|bottom|north|south|east|west)[_ ]?)+|[a-hlr]"
+_CORNER += r"|(?:[fbr][lr]|[lr][fbr]|[tu][lr]|(?!set)[ns][ew])[tbul]?)"
+_HELD = r"(?:cable|rope|wire|winch|tether|drum)"
+LETTERS = "abcdefgh"
+LETTERED: dict[str, tuple[str, ...]] = {
+    which: (rf"{_BEFORE}{_OF}{word}[_ ]{_CORNER}", rf"(?:.*/)?{_CORNER}[_ ](?:{_HELD}[_ ])?{word}")
+    for which, word in (("lengths", "(?:len|lengths?)"), ("tensions", "(?:tens(?:ions?)?|forces?)"))
+}
+LETTERED["lengths"] += rf".*/position\[{_HELD}[_ ]{_CORNER}\]", rf".*/position\[{_CORNER}[_ ]{_HELD}\]"
 DATES = 1e9, 4e9  # [s] from 1970, of recordings: 2001 to 2096
 LEAST_COUNTED, SLOWEST = 100.0, 0.5  # step of times that are no seconds; time between samples [s]
 MANY, LONG = 500, 3600.0  # samples, and [s] that so many would take, of a recording in milliseconds
@@ -167,17 +178,22 @@ def role(name: str, stated: str = "") -> Role | None:
     if found := _SUFFIX.fullmatch(low):
         texts.append((found[1], unit_of(found[2])))
     texts += [(bare, unit) for text, unit in texts if (bare := _MEASURED.sub("", text).lstrip("./_ ")) != text]
-    for text, unit in texts:
-        for which, patterns in PATTERNS.items():
-            if (which == "lengths" and _NO_LENGTH.search(text.rpartition("/")[2])) or (
-                unit and unit not in UNITS[which]
-            ):
-                continue
-            for pattern in patterns:
-                match = re.fullmatch(pattern, text)
-                if match and not (which == "quaternion" and stated in ANGLES):
-                    return _role(which, match, unit, low)
+    usual = product(texts, PATTERNS.items())
+    for (text, unit), (which, patterns) in (*usual, *product(reversed(texts), LETTERED.items())):
+        if (which == "lengths" and _NO_LENGTH.search(text.rpartition("/")[2])) or (unit and unit not in UNITS[which]):
+            continue
+        for pattern in patterns:
+            match = re.fullmatch(pattern, text)
+            if match and not (which == "quaternion" and stated in ANGLES):
+                return _role(which, match, unit, low)
     return None
+
+
+def corner(name: str) -> str:
+    """Return the corner in the name of a cable's field, such as fl of len_FL, empty if it has a number or a letter."""
+    found = role(name)
+    which = found.which if found and found.role in LETTERED else ""
+    return "" if which.isdigit() or which in LETTERS else which
 
 
 def unit_of(word: str) -> str:

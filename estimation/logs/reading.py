@@ -21,6 +21,7 @@ from .frozen import seen
 from .load_cells import notes as unreadable_notes
 from .mapping import Field, Fields, LogMap, carrier_fields, fields_of, free_axes, listed, read_map
 from .measurements import Measurements
+from .names import LETTERED, corner
 from .north_east_down import FROM_FRD, FROM_NED, carriers_from_ned, ned_frame, note_of, platform_from_ned
 from .opening import recordings
 from .pose_track import PoseTrack, unit_quaternions
@@ -247,6 +248,9 @@ def measurements_of(
 ) -> Log:
     """Return the measurements of some fields, at the times of whichever of lengths and poses has fewer samples."""
     notes = [note for one in from_ for note in one.notes]
+    usual = [one for what in LETTERED if not (given and getattr(given, what)) for one in getattr(found, what)]
+    if named := [one.full for one in usual if corner(one.full)]:
+        notes.append(f"columns are taken to be in the order of the cables: {', '.join(named)}; a map may change it")
     main_fields = found.lengths or found.position or found.directions
     main = main_fields[0]
     stated = main.recording.sigma

@@ -91,37 +91,23 @@ def read_recorded(
             commands = lengths_of(known, commands)
         if found.commands and found.commands == read.fields.lengths:  # which are not measured
             lengths = None
-        tensions = measured.tensions if efforts is None else efforts
-        if found.commands and found.commands == read.fields.tensions:
-            tensions = None
+        sensed = not found.commands or found.commands != read.fields.tensions
+        tensions = efforts if efforts is not None else measured.tensions if sensed else None
         if tensions is not None and lengths is not None and unreadable(tensions, measured.lengths).any():
             tensions = None
             notes.append("tensions are left out of the replay, because some were not measured")
         pose, known_part = _poses(known, read, notes)
-        doubt = None
-        if lengths is not None and not any(carrier.moves for carrier in known.carriers):
-            wrong = mistake(known, measured)
-            doubt = wrong.doubt if wrong else None
+        checked = lengths is not None and not any(carrier.moves for carrier in known.carriers)
+        wrong = mistake(known, measured) if checked else None
         carrier_pose, thrusts = carriers_at(known, read.recordings, given, times, len(times), notes)
         axis = read.ned or ned_frame(known, pose, carrier_pose)
         if axis is not None:
             notes += [] if read.ned else [note_of(axis, pose)]
             pose = pose if read.ned else np.asarray(platform_from_ned(known, pose, axis))
             carrier_pose = carriers_from_ned(known, carrier_pose, axis)
-        return Recorded(
-            robot=known,
-            times=times,
-            pose=pose,
-            measured=known_part,
-            lengths=lengths,
-            tensions=tensions,
-            commands=commands,
-            commanded="lengths" if is_length else "forces" if motors else "tensions",
-            carrier_pose=carrier_pose,
-            thrusts=thrusts,
-            notes=notes,
-            doubt=doubt,
-        )
+        doubt, commanded = wrong.doubt if wrong else None, "forces" if motors else "tensions"
+        inputs = lengths, tensions, commands, "lengths" if is_length else commanded
+        return Recorded(known, times, pose, known_part, *inputs, carrier_pose, thrusts, notes, doubt)
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(where) else f"{where}: {text}") from None

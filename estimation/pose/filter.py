@@ -123,12 +123,8 @@ class PoseFilter(Displayed):
         density = np.array([self._sigma["position"], self._sigma["rotation"]]) / root
         band = np.cbrt(np.array(self._jerk) / density)
         place, speed = density * np.sqrt(5 / 3 * band), density * np.sqrt(1.5 * band**3)
-        names = ("position", "attitude"), ("velocity", "attitude_rate")
-        return {
-            name: float(value)
-            for pair, values in zip(names, (place, speed), strict=True)
-            for name, value in zip(pair, values, strict=True)
-        }
+        names = "position", "attitude", "velocity", "attitude_rate"
+        return dict(zip(names, map(float, (*place, *speed)), strict=True))
 
     def update(
         self,
