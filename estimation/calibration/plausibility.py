@@ -215,9 +215,8 @@ def _displaced(log: LogPart, given: Measurements, noise: float) -> Mistake | Non
     corrected = _corrected(given, (*frames.of(position, rotation), None), np.arange(robot.m), 1.0, frames.found)
     shift, turn = frames.inner
     moved = np.linalg.norm(robot.attachments @ (turn - np.eye(3)).T + shift, axis=1).max()
-    return Mistake(
-        _better(str(frames), before, frames.size), corrected, severe=bool(moved > PLAUSIBLE * length_of(robot))
-    )
+    severe = bool(moved > PLAUSIBLE * length_of(robot))
+    return Mistake(_better(str(frames), before, frames.size), corrected, severe)
 
 
 def _part(robot: Robot, part: Measurements, table: np.ndarray) -> LogPart:
@@ -350,10 +349,8 @@ def _too_large(robot: Robot, given: Measurements, readings: np.ndarray) -> Mista
         return None
     factor = next((one for one in FACTORS if one * change <= LARGEST * length), None)
     unit = FACTORS[factor] if factor else "counts, whose size is not given"
-    text = (
-        f"the lengths look like {unit}: they change by {quantity(change, 'm', digits=3)}, and a cable of "
-        f"{robot.name} is about {quantity(length, 'm', digits=3)} long"
-    )
+    by, long = (quantity(one, "m", digits=3) for one in (change, length))
+    text = f"the lengths look like {unit}: they change by {by}, and a cable of {robot.name} is about {long} long"
     corrected = given.changed(lengths=given.lengths * factor) if factor else None
     return Mistake(text, corrected, factors=factor or 1.0)
 

@@ -71,10 +71,8 @@ def pulls_by_thrust(
     if times is None or len(times) <= 2 * FEWEST or len(set(owner)) < len(owner) or not known[owner].all():
         return None
     gains, parabolas = thrust_gains(robot, measured, poses, thrusts), Parabolas(times, within(times))
-    notes += [
-        *notes_of_gains(robot, gains),
-        "tensions are computed from thrusts, weights and accelerations of the carriers",
-    ]
+    notes += notes_of_gains(robot, gains)
+    notes.append("tensions are computed from thrusts, weights and accelerations of the carriers")
     thrust_per_newton = {one.index: one.of(times) for one in gains}
     pulls = np.empty((len(times), len(owner), 3))
     for cable, index in enumerate(owner):
@@ -123,9 +121,8 @@ def carriers_at(
                 vectors.append(carrier.name)
             thrusts[:, index] = values[:, 0] if values.shape[1] == 1 else np.linalg.norm(values, axis=1)
     if vectors:
-        notes.append(
-            f"thrusts of {', '.join(vectors)} are vectors: their sizes are used, along the z axes of the bodies"
-        )
+        named = ", ".join(vectors)
+        notes.append(f"thrusts of {named} are vectors: their sizes are used, along the z axes of the bodies")
     flying = [i for i, carrier in enumerate(robot.carriers) if carrier.actuators]
     if flying and ((given and given.thrusts) or not np.isfinite(thrusts).any()):
         found = command_fields(recordings, given, robot.m, [carrier.name for carrier in robot.carriers])
