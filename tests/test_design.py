@@ -554,7 +554,7 @@ def test_where_the_margin_is_not_reached_the_gains_are_those_of_the_margin():
 
 def test_weaker_winches_are_enough_for_a_better_layout(tmp_path):
     robot = load("ipanema-2")
-    requirements = wanted(robot, minimise="t_max", margin=12.0, clearance=0.03, time_limit=2.0)
+    requirements = wanted(robot, minimise="t_max", margin=12.0, clearance=0.03, time_limit=4.0)
     fixed = design(robot, requirements=requirements | {"free": [winches(robot)], "time_limit": 0.5})
     (tmp_path / "wanted.yaml").write_text(json.dumps(requirements | {"free": [*requirements["free"], winches(robot)]}))
     done = towline("design", "ipanema-2", str(tmp_path / "wanted.yaml"), "--json", "--out", str(tmp_path / "out.yaml"))

@@ -21,7 +21,7 @@ POINTS = [
     {"part": part, "box": {"min": points.min(axis=0).tolist(), "max": points.max(axis=0).tolist()}}
     for part, points in (("anchor", ROBOT.anchors), ("attachment", ROBOT.attachments))
 ]
-CHEAP = {"minimise": "cost", "prices": {"cable": 10.0, "t_max": 0.5}, "margin": 10.0, "time_limit": 0.6}
+CHEAP = {"minimise": "cost", "prices": {"cable": 10.0, "t_max": 0.5}, "margin": 10.0, "time_limit": 1.0}
 REQUIRE = [{"box": BOX, "grid": [3, 3, 3]}]
 
 
@@ -157,7 +157,7 @@ def test_the_size_of_the_boxes_of_a_given_layout_is_that_of_a_bisection():
 
 
 def test_a_layout_for_the_largest_boxes_keeps_the_margin_in_them():
-    options = {"maximise": "volume", "margin": 10.0, "time_limit": 0.8}
+    options = {"maximise": "volume", "margin": 10.0, "time_limit": 1.2}
     found = design(ROBOT, POINTS, REQUIRE, **options)
     assert found.feasible
     assert found.size > 1.1 * found.size_before

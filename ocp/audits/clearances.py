@@ -51,7 +51,7 @@ def came_too_near(audited: Instants) -> list[Excess]:
             facts = (time, value, limit.low, limit.unit, "at least")
             pair = limit.name, limit.about(which), limit.low
             if pair not in exceeded or value < exceeded[pair].value:  # a body and a region may have two limits
-                between = _between_nodes(audited, limit, time, which)
+                between = _between_nodes(audited, limit, time, which, value)
                 exceeded[pair] = Excess(limit.name, limit.about(which), *facts, between=between)
     return list(exceeded.values())
 
@@ -80,11 +80,11 @@ def _values(audited: Instants, limit: Distance, changes: np.ndarray) -> np.ndarr
     return values
 
 
-def _between_nodes(audited: Instants, limit: Distance, time: float, which: int) -> float | None:
+def _between_nodes(audited: Instants, limit: Distance, time: float, which: int, value: float) -> float | None:
     """Return the distance of a pair at a time between two nodes, from the planes between its bodies at these [m].
 
-    However thin one is, so much more distance at the nodes keeps it out of the other; if the planes show that it is on
-    the other side of it at the second node, none does.
+    So much more distance at the nodes keeps one out of the other, however thin it is; it is at most `value`, which is
+    less at the corner of a thick one. If the planes show that it is on the other side at the second node, none does.
     """
     if audited.deviation is None:
         return None
@@ -93,7 +93,7 @@ def _between_nodes(audited: Instants, limit: Distance, time: float, which: int) 
     both = np.full(2, which)
     at_nodes, there = (_at(audited, separating, at, both) for at in (nodes[after - 1 : after + 1], np.full(2, time)))
     passes = at_nodes.normal[0] @ at_nodes.normal[1] < 0
-    return limit.low if passes else float(_from_plane(separating, at_nodes, there).max())
+    return limit.low if passes else min(value, float(_from_plane(separating, at_nodes, there).max()))
 
 
 def _moved(audited: Instants) -> np.ndarray:
