@@ -9,7 +9,7 @@ import daqp
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import block_diag
 
@@ -127,7 +127,11 @@ def check_optimality(problem, solution, tolerance=1e-7):
     y, lower, upper, force = (part.ravel() for part in solution.multipliers)
     bounds = np.zeros((problem.N, problem.m + problem.n))
     bounds[:, : problem.m] = solution.multipliers.upper - solution.multipliers.lower
-    terms = np.array([H @ z, h, G.T @ y, E.T @ force, bounds.ravel()])
+    own = np.zeros_like(
+        bounds
+    )  # multipliers of the dynamics that end in a state; those that begin there may cancel them
+    own[:, problem.m :] = -solution.multipliers.dynamics.reshape(problem.N, -1)
+    terms = np.array([H @ z, h, own.ravel(), G.T @ y - own.ravel(), E.T @ force, bounds.ravel()])
     # A state or control has one unit at all stages.
     each = np.abs(terms).max(axis=0).reshape(problem.N, -1).max(axis=0)
     left = np.abs(terms.sum(axis=0)).reshape(problem.N, -1).max(axis=0)
@@ -229,6 +233,7 @@ def test_daqp_agrees_on_the_condensed_problem():
     st.floats(0.3, 1.4),
     st.booleans(),
 )
+@example(seed=10, N=10, n=3, m=1, p=0, radius=1.38671875, scaled=False)
 def test_conditions_hold_for_all_sizes(seed, N, n, m, p, radius, scaled):
     problem = random_problem(seed, N, n, m, p, radius, scaled=scaled)
     solution = solved(problem)
