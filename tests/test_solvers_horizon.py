@@ -127,9 +127,8 @@ def check_optimality(problem, solution, tolerance=1e-7):
     y, lower, upper, force = (part.ravel() for part in solution.multipliers)
     bounds = np.zeros((problem.N, problem.m + problem.n))
     bounds[:, : problem.m] = solution.multipliers.upper - solution.multipliers.lower
-    own = np.zeros_like(
-        bounds
-    )  # multipliers of the dynamics that end in a state; those that begin there may cancel them
+    # Multipliers of the dynamics that end in a state are a term of their own: those that begin there may cancel them.
+    own = np.zeros_like(bounds)
     own[:, problem.m :] = -solution.multipliers.dynamics.reshape(problem.N, -1)
     terms = np.array([H @ z, h, own.ravel(), G.T @ y - own.ravel(), E.T @ force, bounds.ravel()])
     # A state or control has one unit at all stages.
