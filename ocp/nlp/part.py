@@ -1,7 +1,7 @@
 """`Part`: a node or an interval of a program as functions of its columns, which `part_of` makes of expressions."""
 
 from collections.abc import Callable, Iterable
-from functools import cache
+from functools import cache, partial
 from itertools import chain
 from typing import NamedTuple, TypeAlias
 
@@ -41,14 +41,19 @@ def part_of(
     local: list[tuple[int, Callable[[tuple[int, ...]], Differentiable], list[Row]]] = []
     for index, (values, rows) in of_limits:
         if is_local(limits.all[index]):
-            every = ca.vertcat(*values)
-            of_some = cache(lambda some, of=every: function_of("near", unknowns, parameters, of[[*some]]))
-            local.append((index, of_some, rows))
+            function_of_some = partial(_function_of_some, unknowns, parameters, ca.vertcat(*values))
+            local.append((index, cache(function_of_some), rows))
         else:
             constraints.append((values, rows))
     values, rows = ([*chain(*parts)] for parts in zip(*constraints, strict=True))
     function = function_of(name, unknowns, parameters, ca.vertcat(*values))
     return Part(function_of(f"{name}_cost", unknowns, parameters, cost), function, rows, local)
+
+
+def _function_of_some(
+    unknowns: dict[str, ca.SX], parameters: dict[str, ca.SX], values: ca.SX, picked: tuple[int, ...]
+) -> Differentiable:
+    return function_of("near", unknowns, parameters, values[list(picked)])
 
 
 def function_of(name: str, unknowns: dict[str, ca.SX], parameters: dict[str, ca.SX], value: ca.SX) -> Differentiable:

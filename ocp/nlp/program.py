@@ -163,10 +163,7 @@ def build(
     times = grid.shares * scenario.duration
     p, given, intervals = ca.MX.sym("p", 0), ca.DM(stages.references), ca.DM(grid.intervals)
     if movable:
-        count = stages.references.size
-        p = ca.MX.sym("p", count + 1)  # `_values`
-        given = ca.reshape(p[:count], *stages.references.shape)
-        intervals = ca.vertcat(ca.repmat(p[count], 1, steps), ca.DM.zeros(1, steps))
+        p, given, intervals = _as_parameters(stages.references.shape, steps)
     x = ca.MX.sym("x", len(times) * layout.width)
     X = ca.reshape(x, layout.width, len(times))
     columns = Columns(X, scheme, given, stages.carried, intervals, scenario.duration)
@@ -196,6 +193,13 @@ def build(
     return Program(
         scenario, mesh, layout, grid.shares, problem, *bounds, near, costs, blocks, local=len(local), parameters=values
     )
+
+
+def _as_parameters(shape: tuple[int, int], steps: int) -> tuple[ca.MX, ca.MX, ca.MX]:
+    """Return the parameters of a movable program, and what they are: references, and `Grid.intervals`."""
+    count = shape[0] * shape[1]
+    p = ca.MX.sym("p", count + 1)
+    return p, ca.reshape(p[:count], *shape), ca.vertcat(ca.repmat(p[count], 1, steps), ca.DM.zeros(1, steps))
 
 
 def _values(references: np.ndarray, step: float) -> np.ndarray:

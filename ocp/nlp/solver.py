@@ -176,8 +176,7 @@ class Solver:
         except BaseException:
             if watch.best:
                 self.interrupted = self._outcome(watch.best["x"], watch.objective, True, "interrupted", watch.iteration)
-            # Nobody waits for this run any more, whose thread still uses its objects.
-            watch.abandoned, self._watch, self._solvers = True, _Watch(program), {}
+            self._abandon()
             raise
         statistics = nlp.stats()
         last = {name: result[name].full().ravel() for name in KEPT}
@@ -199,6 +198,12 @@ class Solver:
         slack, seconds = self.program.missing(x), float(deviation.nodes[-1])
         of_task = np.nan if self.program.mesh.elastic else objective
         return Outcome(deviation, seconds, success, message, iterations, slack, of_task)
+
+    def _abandon(self) -> None:
+        """Stop the run for which nobody waits; objects that its thread still uses are not used again."""
+        self._watch.abandoned = True
+        self._watch = _Watch(self.program)
+        self._solvers = {}
 
 
 def check_progress(progress: Any) -> None:
