@@ -1,6 +1,7 @@
 """The costs in the `objective` of a task file."""
 
 import casadi as ca
+from typing_extensions import override
 
 from ...models.rotation import rotation
 from .cost import Cost, CostState, RateCost
@@ -11,6 +12,7 @@ class Tension(Cost):
 
     name, unit = "tension", "N"
 
+    @override
     def values(self, state: CostState) -> ca.SX:
         return state.tensions
 
@@ -20,6 +22,7 @@ class TensionRate(RateCost):
 
     name, unit = "tension_rate", "N/s"
 
+    @override
     def values(self, state: CostState) -> ca.SX:
         return state.tensions
 
@@ -29,6 +32,7 @@ class PathDeviation(Cost):
 
     name, unit = "deviation", "m"
 
+    @override
     def values(self, state: CostState) -> ca.SX:
         return ca.vertcat(state.off_path[:3], state.robot.length * state.off_path[3:])
 
@@ -38,6 +42,7 @@ class CarrierOffset(Cost):
 
     name, unit = "carrier_offset", "m, rad"
 
+    @override
     def values(self, state: CostState) -> ca.SX:
         return ca.vertcat(*(offset.pose for offset in state.offsets[1:]))
 
@@ -50,6 +55,7 @@ class Formation(Cost):
 
     name, unit = "formation", "m"
 
+    @override
     def values(self, state: CostState) -> ca.SX:
         robot, platform = state.robot, state.platform.pose
         turned = rotation(ca.vertcat(0, 0, platform[5] - robot.home[5]))
@@ -63,6 +69,7 @@ class CarrierAcceleration(Cost):
 
     name, unit = "carrier_acceleration", "m/s^2, rad/s^2"
 
+    @override
     def values(self, state: CostState) -> ca.SX:
         return ca.vertcat(*(offset.acceleration for offset in state.offsets[1:]))
 
@@ -72,6 +79,7 @@ class Jerk(RateCost):
 
     name, unit = "jerk", "m/s^3, rad/s^3"
 
+    @override
     def values(self, state: CostState) -> ca.SX:
         return ca.vertcat(*(offset.acceleration for offset in state.offsets))
 
@@ -81,6 +89,7 @@ class Time(Cost):
 
     name, unit, squared = "time", "s", False
 
+    @override
     def values(self, state: CostState) -> ca.SX:
         return state.duration
 
@@ -90,5 +99,6 @@ class Margin(Cost):
 
     name, unit, squared = "margin", "N", False
 
+    @override
     def values(self, state: CostState) -> ca.SX:
         return -state.margin

@@ -35,6 +35,7 @@ class BodyOutside(Outside):
         self.per_metre, self._moving = 1.0, moving
         self.labels = (whose,) * len(moving.parts)
 
+    @override
     def pairs(self, state: State) -> list[Pair]:
         parts = (np.ascontiguousarray(part) for part in self._moving.parts)
         if self._riding:
@@ -43,6 +44,7 @@ class BodyOutside(Outside):
             ends = (kinematics.transform(state.platform.pose, part) for part in parts)
         return [Pair(end, ca.SX(3, 0)) for end in ends]
 
+    @override
     def apart(self, pair: Pair) -> ca.SX:
         return super().apart(pair) - self._moving.radius
 
@@ -84,10 +86,12 @@ class Inside(Distance):
     def title(self) -> str:
         return f"{self.name}, distance from {self._called}"
 
+    @override
     def pairs(self, state: State) -> list[Pair]:
         points = kinematics.transform(state.platform.pose, self._points)
         return [Pair(point, ca.SX(3, 0)) for point in ca.horzsplit(points)]
 
+    @override
     def apart(self, pair: Pair) -> ca.SX:
         return self._sign * (pair.points[self._axis] - self._bound) - self._radius
 

@@ -6,6 +6,7 @@ from typing import Self
 
 import casadi as ca
 import numpy as np
+from typing_extensions import override
 
 from ...models import Robot
 from .clearance import between_cables
@@ -50,6 +51,7 @@ class CableSpeed(SomeCables):
 
     name, unit = "cable_speed", "m/s"
 
+    @override
     def values(self, state: State) -> ca.SX:
         return state.cable_speeds[self.cables]
 
@@ -59,6 +61,7 @@ class CableAcceleration(SomeCables):
 
     name, unit = "cable_acceleration", "m/s^2"
 
+    @override
     def values(self, state: State) -> ca.SX:
         return state.cable_accelerations[self.cables]
 
@@ -74,6 +77,7 @@ class WinchPower(EachCable):
 
     name, unit = "winch_power", "W"
 
+    @override
     def values(self, state: State) -> ca.SX:
         return state.tensions * state.cable_speeds
 
@@ -87,6 +91,7 @@ class WinchForce(SomeCables):
 
     name, unit = "winch_force", "N"
 
+    @override
     def values(self, state: State) -> ca.SX:
         inertia = ca.DM([winch.inertia if (winch := cable.winch) else 0.0 for cable in state.robot.cables])
         return (state.tensions - inertia * state.cable_accelerations)[self.cables]
@@ -101,6 +106,7 @@ class CableLength(Limit):
         self.low, self.high, self.scale = low, high, max(abs(low), abs(high), SMALLEST)
         self.labels = names(robot)
 
+    @override
     def values(self, state: State) -> ca.SX:
         return state.run.lengths
 
@@ -115,10 +121,12 @@ class CableClearance(Distance):
         self._pairs = [pair for pair in combinations(range(robot.m), 2) if not _share_an_end(robot, *pair)]
         self.labels = tuple(f"cables {i + 1} and {j + 1}" for i, j in self._pairs)
 
+    @override
     def pairs(self, state: State) -> list[Pair]:
         cables = [ca.horzcat(state.attachments[:, i], state.anchors[:, i]) for i in range(state.robot.m)]
         return [Pair(cables[i], cables[j]) for i, j in self._pairs]
 
+    @override
     def apart(self, pair: Pair) -> ca.SX:
         return between_cables(*ca.horzsplit(pair.points), *ca.horzsplit(pair.others))
 
@@ -138,6 +146,7 @@ class Margin(Limit):
         self.low, self.scale = least, robot.force_scale
         self.labels = names(robot) * 2
 
+    @override
     def values(self, state: State) -> ca.SX:
         low, high = ca.DM(state.robot.t_min), ca.DM(state.robot.t_max)
         return ca.vertcat(state.tensions - low, high - state.tensions)
@@ -148,5 +157,6 @@ class TensionRate(EachCable, Rate):
 
     name, unit = "tension_rate", "N/s"
 
+    @override
     def values(self, state: State) -> ca.SX:
         return state.tensions

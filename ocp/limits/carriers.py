@@ -7,6 +7,7 @@ from itertools import combinations
 
 import casadi as ca
 import numpy as np
+from typing_extensions import override
 
 from ...models import Robot
 from ...models.carriers import Effort
@@ -27,6 +28,7 @@ class _Motion(Magnitude):
         self.hull = Hull(index, self.derivative, (0, 1, 2))
         self._index = index
 
+    @override
     def values(self, state: State) -> ca.SX:
         return state.carriers[self._index][self.derivative][:3]
 
@@ -54,6 +56,7 @@ class CarrierTilt(Angle):
         self.hull = Hull(index, 0, (3, 4))  # {cos r cos p >= c} is convex
         self._index = index
 
+    @override
     def values(self, state: State) -> ca.SX:
         return state.carriers[self._index].upright
 
@@ -70,6 +73,7 @@ class CarrierTurnAcceleration(Limit):
         self.hull = Hull(index, 2, (3, 4))
         self._index = index
 
+    @override
     def values(self, state: State) -> ca.SX:
         return state.carriers[self._index].acceleration[3:5]
 
@@ -85,6 +89,7 @@ class CarrierReach(Limit):
         self.hull = Hull(index, 0, (axis,))
         self._index, self._axis = index, axis
 
+    @override
     def values(self, state: State) -> ca.SX:
         return state.carriers[self._index].pose[self._axis]
 
@@ -99,10 +104,12 @@ class CarrierSeparation(Distance):
         self._pairs = list(combinations(range(len(robot.carriers)), 2)) if pairs is None else pairs
         self.labels = tuple(f"{robot.carriers[i].name} and {robot.carriers[j].name}" for i, j in self._pairs)
 
+    @override
     def pairs(self, state: State) -> list[Pair]:
         at = [carrier.position for carrier in state.carriers]
         return [Pair(at[i], at[j]) for i, j in self._pairs]
 
+    @override
     def apart(self, pair: Pair) -> ca.SX:
         return between_points(pair.points, pair.others)
 
@@ -124,5 +131,6 @@ class CarrierEffort(Limit):
         self.labels = tuple(robot.carriers[index].name + (way + axis if axis else "") for axis in effort.axes)
         self.scale = effort.scale or robot.force_scale
 
+    @override
     def values(self, state: State) -> ca.SX:
         return state.efforts[self._index][self._which].values

@@ -4,6 +4,7 @@ from abc import abstractmethod
 from typing import NamedTuple
 
 import casadi as ca
+from typing_extensions import override
 
 from .limit import Limit
 from .state import State
@@ -34,5 +35,6 @@ class Distance(Limit):
     def apart(self, pair: Pair) -> ca.SX:
         """Return the distance of two bodies [m]; unless they overlap, it is the smallest between their points."""
 
+    @override
     def values(self, state: State) -> ca.SX:
         return ca.vertcat(*(self.apart(pair) for pair in self.pairs(state)))

@@ -27,6 +27,7 @@ class NaturalFrequency(Limit):
         self.low = self.scale = least
         self._moves = np.flatnonzero(robot.dof_mask).tolist()
 
+    @override
     def values(self, state: State) -> ca.SX:
         """Return the entries of the stiffness and then of the inertia about the CoM, (2 k^2, 1)."""
         robot, pose, t = state.robot, state.platform.pose, state.tensions

@@ -46,6 +46,7 @@ class Outside(Distance):
         """Return points (3, k) of {G} in the frame of the region."""
         return state.on_platform(points) if self._riding else points
 
+    @override
     def apart(self, pair: Pair) -> ca.SX:
         outside = point_outside if pair.points.shape[1] == 1 else cable_outside
         return outside(self.place, *ca.horzsplit(pair.points))
@@ -58,6 +59,7 @@ class _PointsOutside(Outside):
     def _points_of(self, state: State) -> ca.SX:
         """Return the points in the region's frame, (3, k) [m]."""
 
+    @override
     def pairs(self, state: State) -> list[Pair]:
         return [Pair(point, ca.SX(3, 0)) for point in ca.horzsplit(self._points_of(state))]
 
@@ -79,6 +81,7 @@ class PlatformOutside(_PointsOutside):
         self._which = np.flatnonzero(outside).tolist()
         self.labels = ("platform",) * len(self._which)
 
+    @override
     def _points_of(self, state: State) -> ca.SX:
         return ca.horzcat(state.com, state.attachments)[:, self._which]
 
@@ -92,6 +95,7 @@ class CarriersOutside(_PointsOutside):
         self.labels = tuple(robot.carriers[index].name for index in which)
         self.which = which
 
+    @override
     def _points_of(self, state: State) -> ca.SX:
         return self._points(state, ca.horzcat(*(state.carriers[index].position for index in self.which)))
 
@@ -104,6 +108,7 @@ class CablesOutside(Outside):
         self.name = "cable_platform_clearance" if riding else "keep_out"
         self.labels = names(robot)
 
+    @override
     def pairs(self, state: State) -> list[Pair]:
         anchors = self._points(state, state.anchors)
         ends = ca.SX(ca.DM(state.robot.attachments.T)) if self._riding else state.attachments

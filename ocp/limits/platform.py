@@ -18,6 +18,7 @@ class PlatformSpeed(Magnitude):
 
     name, unit = "platform_speed", "m/s"
 
+    @override
     def values(self, state: State) -> ca.SX:
         return state.platform.velocity[:3]
 
@@ -50,6 +51,7 @@ class ZoneSpeed(Magnitude):
     def _outside(self, positions: np.ndarray) -> np.ndarray:
         return np.linalg.norm(positions - self._centre, axis=-1, keepdims=True) - self._radius
 
+    @override
     def values(self, state: State) -> ca.SX:
         from_centre = ca.sumsqr(state.platform.position - ca.DM(self._centre)) / self._radius**2
         # At least one under the root, which has no derivative at zero.
@@ -62,6 +64,7 @@ class PlatformAcceleration(Magnitude):
 
     name, unit = "platform_acceleration", "m/s^2"
 
+    @override
     def values(self, state: State) -> ca.SX:
         return state.platform.acceleration[:3]
 
@@ -71,6 +74,7 @@ class PlatformLateralAcceleration(Magnitude):
 
     name, unit = "platform_lateral_acceleration", "m/s^2"
 
+    @override
     def values(self, state: State) -> ca.SX:
         felt = state.platform.acceleration[:3] - ca.DM(state.robot.gravity)
         return (rotation(state.platform.pose[3:6]).T @ felt)[:2]
@@ -81,6 +85,7 @@ class PlatformTurn(Magnitude):
 
     name, unit = "platform_turn", "rad/s"
 
+    @override
     def values(self, state: State) -> ca.SX:
         return body_rate(state.platform.pose[3:6], state.platform.velocity[3:6])
 
@@ -90,6 +95,7 @@ class PlatformTilt(Angle):
 
     name = "platform_tilt"
 
+    @override
     def values(self, state: State) -> ca.SX:
         return state.platform.upright
 
@@ -103,6 +109,7 @@ class PlatformBox(Limit):
         self._axis, self.low, self.high = axis, low, high
         self.labels = (f"platform along {'xyz'[axis]}",)
 
+    @override
     def values(self, state: State) -> ca.SX:
         return state.platform.pose[self._axis]
 
@@ -117,6 +124,7 @@ class TubePosition(Magnitude):
         super().__init__(radius)
         self.shown = radius > 0
 
+    @override
     def values(self, state: State) -> ca.SX:
         return state.off_path[:3]
 
@@ -138,6 +146,7 @@ class TubeAttitude(Limit):
         self.hull = Hull(None, 0, (3 + axis,), at_ends=False)
         self.shown = turn > 0
 
+    @override
     def values(self, state: State) -> ca.SX:
         return state.off_path[3 + self._axis]
 
