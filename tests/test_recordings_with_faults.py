@@ -64,6 +64,16 @@ def test_counters_that_begin_again():
     np.testing.assert_array_equal(unrolled(lost)[0], lost)
 
 
+@pytest.mark.parametrize("moved", [[1.0, -0.7, 0.4], [6.3, 5.0, -2.0], [1.3, 0.0, 0.0]])
+def test_a_platform_that_moved_between_two_rests_is_no_counter(moved):
+    """Readings at two rests, or with a gap: each goes from one end of its range to the other in one step."""
+    noise = 1e-3 * np.random.default_rng(0).normal(size=(60, 3))
+    readings = [9.0, 8.0, 7.0] + noise + np.outer(np.arange(60) >= 30, moved)
+    found, rolled = unrolled(readings)
+    assert rolled == []
+    np.testing.assert_array_equal(found, readings)
+
+
 @pytest.mark.parametrize("jump", [0.8, 0.3])
 def test_a_clock_that_was_set_is_named(jump, tmp_path):
     _, poses, y, _ = a_motion()

@@ -33,9 +33,11 @@ def locked(lengths: np.ndarray) -> bool:
 def unrolled(readings: np.ndarray) -> tuple[np.ndarray, list[int]]:
     """Return readings (N, m) without the jumps of counters and angles that begin again, and the columns that had some.
 
-    These go from one end of their range to the other in one step, always by the same amount.
+    These go from one end of their range to the other in one step, always by the same amount, while another one moves
+    on. A single jump shows a usual period.
     """
     result, rolled = readings.copy(), list[int]()
+    ranges = np.nanmax(readings, axis=0, initial=-np.inf) - np.nanmin(readings, axis=0, initial=np.inf)
     for i, column in enumerate(readings.T):
         rows = np.flatnonzero(np.isfinite(column))
         y, steps = column[rows], np.diff(column[rows])
@@ -47,10 +49,14 @@ def unrolled(readings: np.ndarray) -> tuple[np.ndarray, list[int]]:
             continue
         around = 0.5 * (steps[np.maximum(jumps - 1, 0)] + steps[np.minimum(jumps + 1, len(steps) - 1)])
         periods = np.abs(steps[jumps] - np.where(np.abs(around) > END * whole, 0.0, around))
-        if np.ptp(periods) <= END * whole:
+        others = np.delete(np.abs(readings[rows[jumps + 1]] - readings[rows[jumps]]) - END * ranges, i, axis=1)
+        moves_on = not (others > 0).all(axis=1).any() or readings.shape[1] == 1  # the platform does not jump
+        if np.ptp(periods) <= END * whole and moves_on:
             period = float(np.median(periods))
             nearest = min(PERIODS, key=lambda one: abs(one - period))
-            period = nearest if abs(nearest - period) <= END * period else period
-            result[rows, i] = np.unwrap(y, period=period)
+            usual = abs(nearest - period) <= END * period
+            if not usual and len(jumps) == 1:
+                continue
+            result[rows, i] = np.unwrap(y, period=nearest if usual else period)
             rolled.append(i)
     return result, rolled
