@@ -8,7 +8,7 @@ import numpy as np
 from .replayed_robot import Parameters
 from .windows import Windows
 
-# Of each parameter: its smallest and largest value, and the step of its derivative.
+# Of each parameter: its smallest and largest value, and the step of its derivative; those of the CoM over the length.
 RANGES = {
     "delay": (-0.2, 0.2, 1e-3),
     "friction": (0.0, 1e5, 0.1),
@@ -26,7 +26,7 @@ REMOVED = 0.01  # of the sum of squares, from which on a parameter is named
 NOTHING = 0.5  # of the sum of squares that noise has: less needs no explanation
 DOUBT = 5e-4  # probability, on each side, that a parameter is named which only the scatter of the windows changes
 TIED = 0.1  # of what the best explains: others that explain as much, up to this, are not distinguished from it
-SHOWN = 0.1  # of a parameter (of 0.1 s, 0.3 m, a tenth of the tensions): its deviation if a recording does not show it
+SHOWN = 0.1  # of a parameter (of 0.1 s, a third of the length, a tenth of the tensions): its deviation if not shown
 BLURRED = 0.2  # of the squares of the derivative by the stiffness: what may be noise of lengths
 FARTHEST = 5.0  # standard deviations of a start
 OUTLYING = 25.0  # times the usual sum of squares of a window
@@ -122,9 +122,15 @@ class Matching:
         away = self._away(parameters)
         return Match(parameters, away[:, : -self.windows.start.shape[1]], self._project(away))
 
+    def _range(self, name: str) -> tuple[float, float, float]:
+        """Return the smallest and the largest value of a parameter, and the step of its derivative."""
+        low, high, step = RANGES[name]
+        scale = self.windows.robot.length if name == "com" else 1.0
+        return scale * low, scale * high, scale * step
+
     def slope(self, first: Match, name: str) -> np.ndarray:
         """Return the derivatives of the residuals of a match by a parameter of k numbers, (k, W, R + P)."""
-        (_, high, step), value, slopes = RANGES[name], np.atleast_1d(getattr(first.parameters, name)), []
+        (_, high, step), value, slopes = self._range(name), np.atleast_1d(getattr(first.parameters, name)), []
         for number in range(len(value)):
             away = (step if value[number] + step <= high else -step) * np.eye(len(value))[number]
             end = self.windows.predict(_with(first.parameters, name, value + away))[0]
@@ -134,8 +140,8 @@ class Matching:
 
     def fitted(self, first: Match, name: str, used: np.ndarray) -> tuple[Match, np.ndarray]:
         """Fit one parameter alone to windows `used`, (W,) of bool; return the match, and standard deviations (k,)."""
-        (low, high, _), best, size = RANGES[name], first, np.size(getattr(first.parameters, name))
-        usual = self.windows.usual_tension if name == "cable_friction" else 1.0
+        (low, high, _), best, size = self._range(name), first, np.size(getattr(first.parameters, name))
+        usual = {"cable_friction": self.windows.usual_tension, "com": self.windows.robot.length}.get(name, 1.0)
         sigma, least = np.full(size, np.inf), 0.0 if size == 1 else 1 / (SHOWN * usual) ** 2
         for _ in range(STEPS):
             slope, value = self.slope(best, name)[:, used], np.atleast_1d(getattr(best.parameters, name))
@@ -170,15 +176,15 @@ class Matching:
 
         found, whole, count = [], first.cost[used].sum(), float(np.count_nonzero(first.left[used]))
         certain = float(stdtrit(max(int(used.sum()) - 1, 1), 1 - DOUBT))  # quantile of Student's t
-        usual = self.windows.usual_tension
+        usual, length = self.windows.usual_tension, self.windows.robot.length
         for name in applicable(self.windows):
             match, sigma = self.fitted(first, name, used)
             before, value = (np.atleast_1d(getattr(one.parameters, name)) for one in (first, match))
             removed = whole - match.cost[used].sum()
-            sizes = {"delay": 0.1, "com": 0.3, "cable_friction": usual, "friction": max(10 * value[0], 0.1 * usual)}
-            size = sizes.get(name, 1.0)
+            sizes = {"delay": 0.1, "com": length / 3, "cable_friction": usual}
+            size = max(10 * value[0], 0.1 * usual) if name == "friction" else sizes.get(name, 1.0)
             certainly = np.abs(value - before) > certain * sigma
-            low, high, _ = RANGES[name]
+            low, high, _ = self._range(name)
             inside = bool(((low < value + (name == "friction")) & (value < high)).all())
             shown = inside and bool((sigma[certainly] if certainly.any() else sigma).max() < SHOWN * size)
             if name == "stiffness":  # noise of lengths, which it multiplies, would make it too small
