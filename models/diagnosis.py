@@ -49,8 +49,15 @@ def diagnose(robot: AnyRobot) -> Diagnosis:
         int(np.linalg.matrix_rank(dynamics.wrench_matrix(poses) * scale * rows, rtol=INDEPENDENT).max())
         for poses in (robot.home, levels, turned)
     )
-    reason = _why(robot, A, rank, lengths) if rank < len(robot.platform.dof) else ""
-    return Diagnosis(rank, level, tilted, singular_values, lengths, reason, [*too_weak(robot), *_implausible(robot)])
+    return Diagnosis(
+        rank=rank,
+        rank_level=level,
+        rank_tilted=tilted,
+        singular_values=singular_values,
+        lengths=lengths,
+        reason=_why(robot, A, rank, lengths) if rank < len(robot.platform.dof) else "",
+        warnings=[*too_weak(robot), *_implausible(robot)],
+    )
 
 
 def _why(robot: Robot, A: np.ndarray, rank: int, lengths: np.ndarray) -> str:

@@ -142,6 +142,8 @@ class Measurements(Displayed):
         Raises:
             InputError: If one has a wrong name, shape or value.
         """
+        for name in new:
+            one_of("the name of an argument", name, CHECKS)
         shape = self.lengths.shape
         if np.shape(new.get("lengths", self.lengths)) != shape:
             given: dict[str, Any] = {name: getattr(self, name) for name in ARRAYS}
@@ -150,7 +152,7 @@ class Measurements(Displayed):
             return other
         result = copy(self)  # which shares the arrays that stay: those of a long log are large
         for name, value in new.items():
-            setattr(result, name, CHECKS[one_of("the name of an argument", name, CHECKS)](value, shape))
+            setattr(result, name, CHECKS[name](value, shape))
         return result
 
     def save(self, path: str | os.PathLike[str]) -> Path:

@@ -106,8 +106,20 @@ def read_recorded(
             pose = pose if read.ned else np.asarray(platform_from_ned(known, pose, axis))
             carrier_pose = carriers_from_ned(known, carrier_pose, axis)
         doubt, commanded = wrong.doubt if wrong else None, "forces" if motors else "tensions"
-        inputs = lengths, tensions, commands, "lengths" if is_length else commanded
-        return Recorded(known, times, pose, known_part, *inputs, carrier_pose, thrusts, notes, doubt)
+        return Recorded(
+            robot=known,
+            times=times,
+            pose=pose,
+            measured=known_part,
+            lengths=lengths,
+            tensions=tensions,
+            commands=commands,
+            commanded="lengths" if is_length else commanded,
+            carrier_pose=carrier_pose,
+            thrusts=thrusts,
+            notes=notes,
+            doubt=doubt,
+        )
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(where) else f"{where}: {text}") from None
