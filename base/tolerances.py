@@ -26,8 +26,8 @@ RANK = 1e-12
 # rounding. The C core, which looks at pivots, does the same below 4e-11 and leaves those up to 1e-9 alone.
 DOUBTFUL = 1e-10
 
-# Directions with singular values of the wrench matrix below this part of the largest count as none: along less the
-# cables give nothing worth counting on.
+# A direction whose singular value of the wrench matrix is below this part of the largest is one in which the cables
+# are taken to give no wrench.
 INDEPENDENT = 1e-3
 
 # A cable pulls along a direction d only if |d . a_i| exceeds this part of its column norm; if none does, w is outside

@@ -285,7 +285,7 @@ class _Instants(NamedTuple):
     c: np.ndarray
     low: np.ndarray  # of what the cables can give
     high: np.ndarray
-    carriers: tuple[np.ndarray, np.ndarray, np.ndarray]  # vv, vg and gg of `Bounds`
+    carriers: tuple[np.ndarray, np.ndarray, np.ndarray]  # vv, vg and gg of `_Bounds`
 
     def bounds(self, reserve: float) -> _Bounds:
         """Return the bounds of u; tensions keep the share `reserve` of their range."""

@@ -200,9 +200,10 @@ class Balance:
     def masses(
         self, of: Parameters, x: np.ndarray, placed: tuple[np.ndarray, np.ndarray], clock: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the mass that the tensions carry at each sample [kg], (N,), and what friction would add, (N, m).
+        """Return the mass that the tensions carry at each sample [kg], (N,), and what friction would add to it, (N, m).
 
-        That is the share of each tension with the sign of the cable's speed. Arguments as for `at`.
+        Friction adds the vertical part of each cable's pull, with the sign of the cable's speed [kg/N]. Arguments as
+        for `at`.
         """
         forces = self._forces(of, x, placed, clock, 1.0)
         down = forces.pull / (forces.pull**2).sum(axis=1, keepdims=True)

@@ -106,7 +106,7 @@ def fitted_orders(log: LogPart) -> list[np.ndarray]:
         (one, few._replace(y=few.y[:, order], counted=True), order) for one, order in zip(found, orders, strict=True)
     )
     simple = [(_simplest(part, one), order) for one, part, order in parts if one.size < least]
-    counts = [sum((t.any() or (NONE[1] != T).any()) for t, T in (one.outer, one.inner)) for one, _ in simple]
+    counts = [len(one.found) for one, _ in simple]
     return [np.array(order) for (_, order), count in zip(simple, counts, strict=True) if count == min(counts)]
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...models.dynamics import Dynamics
+from ...models.dynamics import dynamics_of
 from ...models.robot import Robot
 from ..logs.load_cells import SAME, slack
 from ..logs.measurements import Measurements, carriers_of, tracked
@@ -37,7 +37,7 @@ def _still(robot: Robot, measurements: Measurements) -> np.ndarray:
     parameters = Parameters(robot, ())
     lengths = parameters.table(parameters.first)[:, 7] * y[rows]
     if known.any():
-        lengths = np.asarray(Dynamics(robot).cable_lengths(*_poses(robot, measurements, rows)))
+        lengths = np.asarray(dynamics_of(robot).cable_lengths(*_poses(robot, measurements, rows)))
     for i in np.flatnonzero(same.any(axis=0)):
         begins = np.flatnonzero(np.concatenate([[True], ~same[:, i]]))  # of parts with the same reading
         of = lengths[:, [i]] if known.any() else np.delete(lengths, i, axis=1)
@@ -62,8 +62,8 @@ def _loose(robot: Robot, measurements: Measurements) -> np.ndarray:
         return result
     for rows in np.array_split(np.flatnonzero(known), len(known) // CHUNK + 1):
         poses, carriers = _poses(robot, measurements, rows)
-        A = np.asarray(Dynamics(robot).wrench_matrix(poses, carriers))[:, axes] * robot.wrench_scale[axes, None]
-        wrench = np.asarray(Dynamics(robot).required_wrench(poses, 0 * poses, 0 * poses))[:, axes]
+        A = np.asarray(dynamics_of(robot).wrench_matrix(poses, carriers))[:, axes] * robot.wrench_scale[axes, None]
+        wrench = np.asarray(dynamics_of(robot).required_wrench(poses, 0 * poses, 0 * poses))[:, axes]
         tensions = (np.linalg.pinv(A) @ (wrench * robot.wrench_scale[axes])[..., None])[..., 0]
         result[rows] = tensions < HARDLY * np.abs(tensions).mean()
     return np.asarray(result & (result.mean(axis=0) < MOST_SLACK))

@@ -25,7 +25,8 @@ COARSER, SURE, LONGEST_STEP = (4, 16), 0.9, 0.5  # times the finest step, the co
 STEPS = 20
 Signals = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
 LARGEST_DRIFT, USUAL_DRIFT = 0.01, 1e-4
-JUMP, MOST_JUMPS, NO_JUMP = 5.0, 4, 0.5  # usual steps, gaps that are tried, and what is left without a jump
+JUMP, MOST_JUMPS = 5.0, 4  # usual steps, from which on a gap may be a jump of the clock, and how many are looked at
+NO_JUMP = 0.5  # of what poses leave unexplained: less is left once a jump is taken out
 CORRELATED = 5.0  # by which the errors of a model exceed those of as much noise
 
 
