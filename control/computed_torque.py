@@ -293,8 +293,8 @@ class ComputedTorque(Controller):
             state, reference = self._as_floats(state, reference)
             control_step(0.0, 0.0, *scales, TAKE_ALONE, state, reference, *own, None, *self._arrays)
             cables, age = self._cables, time - seen
-            # The difference from the commands is smoothed over the age, and taken to stay as it is: unsmoothed, it would
-            # make the loop unstable if the true age differed.
+            # The difference from the commands is smoothed over the age, and taken to stay as it is. Unsmoothed, it
+            # would make the loop unstable if the true age differed.
             share = min(since / age, 1.0) if age > ROUNDING else 1.0
             self._otherwise += share * (cables["known"] - cables["then"] - self._otherwise)
             self._sent_lately.remember(self._last, dt, state.tensions, reference.tensions)

@@ -68,7 +68,7 @@ def test_counters_that_begin_again():
 def test_a_platform_that_moved_between_two_rests_is_no_counter(moved):
     """Readings at two rests, or with a gap: each goes from one end of its range to the other in one step."""
     noise = 1e-3 * np.random.default_rng(0).normal(size=(60, 3))
-    readings = [9.0, 8.0, 7.0] + noise + np.outer(np.arange(60) >= 30, moved)
+    readings = np.array([9.0, 8.0, 7.0]) + noise + np.outer(np.arange(60) >= 30, moved)
     found, rolled = unrolled(readings)
     assert rolled == []
     np.testing.assert_array_equal(found, readings)

@@ -37,7 +37,8 @@ def unrolled(readings: np.ndarray) -> tuple[np.ndarray, list[int]]:
     on. A single jump shows a usual period.
     """
     result, rolled = readings.copy(), list[int]()
-    ranges = np.nanmax(readings, axis=0, initial=-np.inf) - np.nanmin(readings, axis=0, initial=np.inf)
+    known = np.where(np.isfinite(readings), readings, np.nan)
+    ranges = np.nanmax(known, axis=0, initial=-np.inf) - np.nanmin(known, axis=0, initial=np.inf)
     for i, column in enumerate(readings.T):
         rows = np.flatnonzero(np.isfinite(column))
         y, steps = column[rows], np.diff(column[rows])
@@ -49,7 +50,7 @@ def unrolled(readings: np.ndarray) -> tuple[np.ndarray, list[int]]:
             continue
         around = 0.5 * (steps[np.maximum(jumps - 1, 0)] + steps[np.minimum(jumps + 1, len(steps) - 1)])
         periods = np.abs(steps[jumps] - np.where(np.abs(around) > END * whole, 0.0, around))
-        others = np.delete(np.abs(readings[rows[jumps + 1]] - readings[rows[jumps]]) - END * ranges, i, axis=1)
+        others = np.delete(np.abs(known[rows[jumps + 1]] - known[rows[jumps]]) - END * ranges, i, axis=1)
         moves_on = not (others > 0).all(axis=1).any() or readings.shape[1] == 1  # the platform does not jump
         if np.ptp(periods) <= END * whole and moves_on:
             period = float(np.median(periods))
