@@ -119,7 +119,8 @@ def real_array(name: str, value: Any) -> NDArray[Any]:
         raise InputError(
             f"{name} must be an array of real numbers, got {shown(value)} (rows of unequal length?)"
         ) from None
-    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+    # Plain arrays and lists do not ask numpy.ma, whose import takes longer than solving 10 000 problems.
+    if isinstance(value, np.ndarray) and type(value) is not np.ndarray and np.ma.is_masked(value):
         raise InputError(f"{name} must be an array of real numbers without masked entries, got {shown(value)}")
     if array.dtype.kind not in "fiu":
         given = shown(value) if array.ndim == 0 else f"entries of type {array.dtype.name}"
