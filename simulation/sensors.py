@@ -81,4 +81,6 @@ class Sensors:
 
 def _rounded(values: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Return values as whole numbers of steps; steps of zero change nothing."""
+    if not steps.any():
+        return values
     return np.where(steps > 0, np.round(values / np.where(steps > 0, steps, 1.0)) * steps, values)
