@@ -84,76 +84,116 @@ class Cycle:
         self._force = robot.platform.mass / robot.force_scale * np.array(robot.gravity)
         # Guides are parallel to the axes about which a platform turns, so they have no moments about these.
         self._length, self._rows = robot.length, np.flatnonzero(robot.dof_mask)
-        self.half = half = np.zeros(6)
-        half[list(scenario.platform_free)] = [
+        self.half = np.zeros(6)
+        self.half[list(scenario.platform_free)] = [
             tube.turn if i in ATTITUDE else tube.radius for i in scenario.platform_free
         ]
-        signs = np.stack(np.meshgrid(*[[-1.0, 1.0] if each else [0.0] for each in half]), axis=-1).reshape(-1, 6)
-        self.corners, body = len(signs), np.vstack([robot.attachments, robot.platform.com])
-        middle = placed(motion.pose, body)
-        points = placed(motion.pose[:, None] + signs * half, body)  # (n, k, m + 1, 3)
+        self._balanced = not (self.half[3:].any() or motion.velocity[:, 3:].any())
         anchors = scenario.dynamics.points(motion.pose[:1], carriers.pose[:1])[0][0]
+        body = np.vstack([robot.attachments, robot.platform.com])
+        middle = placed(motion.pose, body)  # (n, m + 1, 3)
         self._com = middle[:, -1] - middle[:, -1].mean(axis=0)
-        self._balanced = not (half[3:].any() or motion.velocity[:, 3:].any())
-        lines = anchors - points[..., :-1, :]
-        self._u = lines / np.linalg.norm(lines, axis=-1, keepdims=True)
-        # About the CoM, or else the mean of its positions.
-        about = points[..., -1:, :] if self._balanced else middle[:, -1].mean(axis=0)
-        ends = points[..., :-1, :] if self._balanced else anchors
-        self._levers = np.broadcast_to(ends - about, lines.shape)
-        moments = np.cross((points[..., -1:, :] - about)[..., 0, :], self._force) / self._length
-        self._taken = -np.concatenate([0 * moments + self._force, moments], axis=-1)  # by the weight, (n, k, 6)
-        # Twice what points move to halfway between two places, and what they move from there to corners at most.
+        signs = np.stack(np.meshgrid(*[[-1.0, 1.0] if each else [0.0] for each in self.half]), axis=-1).reshape(-1, 6)
+        self.corners = len(signs)
+        self._hang(anchors, placed(motion.pose[:, None] + signs * self.half, body), middle[:, -1].mean(axis=0))
         reach, speeds = np.linalg.norm(body, axis=1), np.abs(motion.velocity)
         fastest = np.linalg.norm(speeds[:, :3], axis=1).max() + speeds[:, 3:].sum(axis=1).max() * reach
-        beside, moved = scenario.duration / PLACES * fastest, np.linalg.norm(half[:3]) + half[3:].sum() * reach
-        nearest = np.linalg.norm(anchors - middle[:, :-1], axis=-1) - (moved + beside)[:-1]
+        self._bound(np.linalg.norm(anchors - middle[:, :-1], axis=-1), reach, scenario.duration / PLACES * fastest)
+
+    def _hang(self, anchors: np.ndarray, points: np.ndarray, middle: np.ndarray) -> None:
+        """Compute directions and levers of the cables, and what the weight takes, at the corners of all places.
+
+        Args:
+            anchors: In {G}, (m, 3) [m].
+            points: Attachments and CoM in {G}, (n, k, m + 1, 3) [m].
+            middle: The mean position of the CoM in {G}, (3,) [m].
+        """
+        attachments, com = points[..., :-1, :], points[..., -1:, :]
+        lines = anchors - attachments
+        self._u = lines / np.linalg.norm(lines, axis=-1, keepdims=True)
+        # Moments are about the CoM if they are balanced at all times, or else about the mean of its positions.
+        about, ends = (com, attachments) if self._balanced else (middle, anchors)
+        self._levers = np.broadcast_to(ends - about, lines.shape)
+        moments = np.cross((com - about)[..., 0, :], self._force) / self._length
+        self._taken = -np.concatenate([0 * moments + self._force, moments], axis=-1)  # (n, k, 6)
+
+    def _bound(self, lengths: np.ndarray, reach: np.ndarray, beside: np.ndarray) -> None:
+        """Bound how far cables and CoM in the tube, and between places, differ from those at corners of places.
+
+        Args:
+            lengths: Of the cables on the path, (n, m) [m].
+            reach: Distances of attachments and CoM from the platform's origin, (m + 1,) [m].
+            beside: Twice what these move at most until halfway between two places, (m + 1,) [m].
+        """
+        shifts, turns = self.half[:3], self.half[3:]
+        moved = np.linalg.norm(shifts) + turns.sum() * reach  # from a place to its corners, at most
+        nearest = lengths - (moved + beside)[:-1]
         nearest[nearest <= 0.0] = np.nan  # nothing is known then
         # First and second derivatives of the directions of cables and of the CoM: between places and between corners.
         bent = reach[:-1] / nearest + CURVED * (reach[:-1] / nearest) ** 2
-        curved = CURVED * half[:3] @ half[:3] / nearest**2 + half[3:] @ half[3:] * bent
+        curved = CURVED * shifts @ shifts / nearest**2 + turns @ turns * bent
         self._off = beside[:-1] / nearest + curved / 2  # (n, m)
-        self._off_com = 0.0 if self._balanced else beside[-1] + reach[-1] * (half[3:] @ half[3:]) / 2
-        self._spread = half[:3] + half[3:].sum() * reach[-1]  # of the CoM in the tube, along each axis [m]
+        self._off_com = 0.0 if self._balanced else beside[-1] + reach[-1] * (turns @ turns) / 2
+        self._spread = shifts + turns.sum() * reach[-1]  # of the CoM in the tube, along each axis [m]
 
     def directions(self, pairs: list[tuple[int, int]]) -> np.ndarray | None:
         """Return the directions (n, 6) along which the cables are short by most at `pairs` of place and corner.
 
         None if they are short along none.
+
+        The unknowns of the linear program are the rows of the directions; for each cable of each pair, at most what it
+        gives along its own; the shortfalls; and by how much the place in the tube may reduce what momentum takes. Where
+        the duration is fixed, the mean of the shortfalls at the nodes counts, otherwise the smallest.
         """
         from scipy import sparse
         from scipy.optimize import linprog
 
-        nodes, m, p = PLACES // FEW, self._u.shape[2], len(pairs)
+        m, p = self._u.shape[2], len(pairs)
         at, corner = np.array(pairs).T
-        node, forces = at // FEW, self._rows < 3
-        u, levers, taken = self._u[at, corner], self._levers[at, corner], self._taken[at, corner][:, self._rows]
-        A = np.concatenate([u, np.cross(levers, u) / self._length], axis=2)[..., self._rows]  # (p, m, r)
-        # Unknowns: each row of the directions at each node, or at all; what each cable gives along its own at most;
-        # the shortfall at each node, or at all; and by how much the place in the tube may reduce what momentum takes.
-        own = [nodes if (self._fixed if force else self._balanced) else 1 for force in forces]
-        unknown = np.split(np.eye(sum(own)), np.cumsum(own)[:-1])
-        rows = np.stack([np.broadcast_to(row, (nodes, sum(own))) for row in unknown], axis=1)  # (nodes, r, unknowns)
+        node, forces, rows = at // FEW, self._rows < 3, self._rows_of_directions()
+        x = (self._matrices(at, corner) @ rows[node]).reshape(p * m, -1)  # of t x in terms of the directions
+        taken = np.einsum("pr,pri->pi", self._taken[at, corner][:, self._rows], rows[node])
         bent = self._bent(rows[:, forces])
-        momentum = np.einsum("nri,nr->i", bent, self._com[::FEW, self._rows[forces]]) / nodes
-        bent, spread = bent.reshape(-1, sum(own)), np.tile(self._spread[self._rows[forces]], nodes) / nodes
-        x, taken = (A @ rows[node]).reshape(p * m, -1), np.einsum("pr,pri->pi", taken, rows[node])
-        which = node if self._fixed else 0 * node
-        counts, each = sparse.csr_array((np.ones(p), (np.arange(p), which))), 1 / (which.max() + 1)
+        momentum = np.einsum("nri,nr->i", bent, self._com[::FEW, self._rows[forces]]) / len(rows)
+        bent = bent.reshape(-1, rows.shape[2])
+        spread = np.tile(self._spread[self._rows[forces]], len(rows)) / len(rows)
+        which = node if self._fixed else 0 * node  # of the shortfalls
+        counts, shortfalls = sparse.csr_array((np.ones(p), (np.arange(p), which))), int(which.max()) + 1
         given, lost, sums = sparse.eye_array(p * m), sparse.eye_array(len(bent)), np.kron(np.eye(p), np.ones(m))
-        blocks = [[np.tile(t, p)[:, None] * x, -given, None, None] for t in (self._low, self._high)]
-        blocks += [[-taken, sums, counts, None], [bent, None, None, -lost], [-bent, None, None, -lost]]
+        blocks = [
+            [np.tile(self._low, p)[:, None] * x, -given, None, None],  # low x <= given
+            [np.tile(self._high, p)[:, None] * x, -given, None, None],  # high x <= given
+            [-taken, sums, counts, None],  # all that is given, and the shortfall, <= taken
+            [bent, None, None, -lost],  # |m f''| <= lost
+            [-bent, None, None, -lost],
+        ]
         least = sparse.block_array(blocks, format="csr")
-        cost = np.concatenate([-momentum, np.zeros(p * m), -np.full(which.max() + 1, each), spread])
-        bounds = [(-1, 1)] * sum(own) + [(None, None)] * (len(cost) - sum(own))
-        found = linprog(cost, A_ub=least, b_ub=np.zeros(2 * p * m + p + 2 * len(bent)), bounds=bounds, method="highs")
+        cost = np.concatenate([-momentum, np.zeros(p * m), np.full(shortfalls, -1 / shortfalls), spread])
+        bounds = [(-1, 1)] * rows.shape[2] + [(None, None)] * (len(cost) - rows.shape[2])
+        found = linprog(cost, A_ub=least, b_ub=np.zeros(least.shape[0]), bounds=bounds, method="highs")
         if not found.success or -found.fun <= CERTAIN:
             return None
-        at_nodes = np.zeros((nodes + 1, 6))
-        at_nodes[:-1, self._rows] = rows @ found.x[: sum(own)]
+        at_nodes = np.zeros((len(rows) + 1, 6))
+        at_nodes[:-1, self._rows] = rows @ found.x[: rows.shape[2]]
         at_nodes[-1] = at_nodes[0]
-        directions = np.stack([np.interp(np.arange(PLACES) / FEW, range(nodes + 1), row) for row in at_nodes.T], axis=1)
+        places = np.arange(PLACES) / FEW
+        directions = np.stack([np.interp(places, range(len(at_nodes)), row) for row in at_nodes.T], axis=1)
         return directions / np.linalg.norm(directions, axis=1).max()
+
+    def _rows_of_directions(self) -> np.ndarray:
+        """Return the r rows of the directions at all nodes in terms of u unknowns, (nodes, r, u).
+
+        A row has an unknown for each node if it may change along the path, otherwise one.
+        """
+        nodes = PLACES // FEW
+        own = [nodes if (self._fixed if row < 3 else self._balanced) else 1 for row in self._rows]
+        unknown = np.split(np.eye(sum(own)), np.cumsum(own)[:-1])
+        return np.stack([np.broadcast_to(row, (nodes, sum(own))) for row in unknown], axis=1)
+
+    def _matrices(self, at: np.ndarray, corner: np.ndarray) -> np.ndarray:
+        """Return the transposed wrench matrices of pairs of place and corner, (p, m, r), moments over the length."""
+        u, levers = self._u[at, corner], self._levers[at, corner]
+        return np.concatenate([u, np.cross(levers, u) / self._length], axis=2)[..., self._rows]
 
     def shortfall(self, directions: np.ndarray) -> tuple[float, set[tuple[int, int]]]:
         """Return a lower bound of the shortfall along directions (n, 6) in the whole tube, and where it is smallest.
