@@ -15,6 +15,7 @@ import numpy as np
 
 from ..base.display import record
 from ..models import kinematics
+from ..models.cables.pulley import Exit
 from ..models.rigid_body import pull_on_carrier
 from ..models.robot import Robot
 
@@ -57,39 +58,65 @@ def formation(robot: Robot, pose: np.ndarray, carrier_pose: np.ndarray, lengths:
     return Formation(pose, carrier_pose, np.zeros(robot.m), -weight)
 
 
+class _Row(NamedTuple):
+    """A constraint: low <= value <= high, in parts of the characteristic force or length."""
+
+    value: ca.SX  # (k, 1)
+    low: float | np.ndarray = 0.0
+    high: float | np.ndarray = 0.0
+
+
 def _solved(robot: Robot, pose: np.ndarray, carriers: np.ndarray, lengths: np.ndarray, most: float) -> Formation | None:
-    c, m, force, gravity = len(robot.carriers), robot.m, robot.force_scale, np.array(robot.gravity)
-    tilt, moved, t, missing = ca.SX.sym("tilt", 2), ca.SX.sym("moved", 5, c), ca.SX.sym("t", m), ca.SX.sym("missing", 6)
+    """Return the nearest formation that misses up to `most` in a row, as a part of the force scale, or None."""
+    c, m = len(robot.carriers), robot.m
+    tilt, moved = ca.SX.sym("tilt", 2), ca.SX.sym("moved", 5, c)  # moved: x, y, z, roll and pitch of the carriers
+    t, missing = ca.SX.sym("t", m), ca.SX.sym("missing", 6)
     at, placed = ca.vertcat(pose[:3], tilt, pose[5]), ca.vertcat(moved, ca.DM(carriers[:, 5]).T).T  # (c, 6)
-    anchors = kinematics.anchors(robot, placed)
-    axes = kinematics.axes(robot, placed)
-    run = kinematics.cables(robot, at, anchors, axes)
-    A = kinematics.wrench_matrix(robot, at, run.directions)
-    scale = np.repeat([1.0, 1 / robot.length], 3) / force
-    weight = np.append(robot.platform.mass * gravity, np.zeros(3))
-    rows = [scale * (A @ t + weight) + missing, (ca.vec(run.lengths) - lengths) / robot.length]
-    low = [np.zeros(6 + m)]
-    high, still = [*low], ca.DM.zeros(6, 1)
-    for index, carrier in enumerate(robot.carriers):
-        own = placed[index, :].T
-        pull = pull_on_carrier(robot, index, run, own, t)
-        for effort in carrier.required_effort(own, still, still, pull, gravity):
-            room, count = MARGIN * (effort.high - effort.low), effort.values.numel()
-            rows.append(effort.values / force)
-            low.append(np.full(count, (effort.low + room) / force))
-            high.append(np.full(count, (effort.high - room) / force))
+    run = kinematics.cables(robot, at, kinematics.anchors(robot, placed), kinematics.axes(robot, placed))
+    rows = [*_at_rest(robot, at, run, t, missing, lengths), *_inside_efforts(robot, placed, run, t)]
     cost = ca.sumsqr(moved[:3, :] - ca.DM(carriers[:, :3]).T) + robot.length**2 * ca.sumsqr(tilt - pose[3:5])
     cost += PENALTY * robot.length**2 * ca.sumsqr(missing)
-    problem = {"x": ca.vertcat(tilt, ca.vec(moved), t, missing), "f": cost, "g": ca.vertcat(*rows)}
-    solver = ca.nlpsol("formation", "ipopt", problem, OPTIONS)
-    start = np.hstack([pose[3:5], carriers[:, :5].ravel(), np.clip(force / m, robot.t_min, robot.t_max), np.zeros(6)])
-    room, free, lack = MARGIN * (robot.t_max - robot.t_min), np.full(2 + 5 * c, np.inf), np.full(6, most)
-    free[:2] = TILT
-    lower, upper = [-free, robot.t_min + room, -lack], [free, robot.t_max - room, lack]
-    of_rows = {"lbg": np.hstack(low), "ubg": np.hstack(high)}
-    found = solver(x0=start, lbx=np.hstack(lower), ubx=np.hstack(upper), **of_rows)
+    unknowns, values = ca.vertcat(tilt, ca.vec(moved), t, missing), ca.vertcat(*(row.value for row in rows))
+    solver = ca.nlpsol("formation", "ipopt", {"x": unknowns, "f": cost, "g": values}, OPTIONS)
+    room, free = MARGIN * (robot.t_max - robot.t_min), np.full(5 * c, np.inf)
+    pulls = np.clip(robot.force_scale / m, robot.t_min, robot.t_max)
+    found = solver(
+        x0=np.hstack([pose[3:5], carriers[:, :5].ravel(), pulls, np.zeros(6)]),
+        lbx=np.hstack([[-TILT, -TILT], -free, robot.t_min + room, np.full(6, -most)]),
+        ubx=np.hstack([[TILT, TILT], free, robot.t_max - room, np.full(6, most)]),
+        lbg=np.hstack([np.broadcast_to(row.low, row.value.numel()) for row in rows]),
+        ubg=np.hstack([np.broadcast_to(row.high, row.value.numel()) for row in rows]),
+    )
     if not solver.stats()["success"]:
         return None
-    x = np.asarray(found["x"]).ravel()
-    placed = np.column_stack([x[2 : 2 + 5 * c].reshape(c, 5), carriers[:, 5]])
-    return Formation(np.hstack([pose[:3], x[:2], pose[5]]), placed, x[2 + 5 * c : -6], x[-6:] / scale)
+    tilted, places, tensions, lacking = np.split(np.asarray(found["x"]).ravel(), np.cumsum([2, 5 * c, m]))
+    placed_at = np.column_stack([places.reshape(c, 5), carriers[:, 5]])
+    return Formation(np.hstack([pose[:3], tilted, pose[5]]), placed_at, tensions, lacking / _scale(robot))
+
+
+def _scale(robot: Robot) -> np.ndarray:
+    """Return the factors from a wrench to parts of the characteristic force, (6,) [1/N, 1/(N m)]."""
+    return np.repeat([1.0, 1 / robot.length], 3) / robot.force_scale
+
+
+def _at_rest(robot: Robot, pose: ca.SX, run: Exit, tensions: ca.SX, missing: ca.SX, lengths: np.ndarray) -> list[_Row]:
+    """Return the balance of the platform, up to the `missing` part of its wrench, and the lengths of the cables."""
+    A = kinematics.wrench_matrix(robot, pose, run.directions)
+    weight = np.append(robot.platform.mass * np.array(robot.gravity), np.zeros(3))
+    return [
+        _Row(_scale(robot) * (A @ tensions + weight) + missing),
+        _Row((ca.vec(run.lengths) - lengths) / robot.length),
+    ]
+
+
+def _inside_efforts(robot: Robot, carriers: ca.SX, run: Exit, tensions: ca.SX) -> list[_Row]:
+    """Return the efforts of the carriers at rest under the pull of their cables, and their limits less a margin."""
+    still, gravity, force = ca.DM.zeros(6, 1), np.array(robot.gravity), robot.force_scale
+    rows = []
+    for index, carrier in enumerate(robot.carriers):
+        own = carriers[index, :].T
+        pull = pull_on_carrier(robot, index, run, own, tensions)
+        for effort in carrier.required_effort(own, still, still, pull, gravity):
+            room = MARGIN * (effort.high - effort.low)
+            rows.append(_Row(effort.values / force, (effort.low + room) / force, (effort.high - room) / force))
+    return rows

@@ -170,7 +170,7 @@ class Cycle:
         least = sparse.block_array(blocks, format="csr")
         cost = np.concatenate([-momentum, np.zeros(p * m), np.full(shortfalls, -1 / shortfalls), spread])
         bounds = [(-1, 1)] * rows.shape[2] + [(None, None)] * (len(cost) - rows.shape[2])
-        found = linprog(cost, A_ub=least, b_ub=np.zeros(least.shape[0]), bounds=bounds, method="highs")
+        found = linprog(cost, A_ub=least, b_ub=np.zeros(2 * p * m + p + 2 * len(bent)), bounds=bounds, method="highs")
         if not found.success or -found.fun <= CERTAIN:
             return None
         at_nodes = np.zeros((len(rows) + 1, 6))
