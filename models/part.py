@@ -25,11 +25,13 @@ def _plain_number(value: Any) -> Any:
     return value
 
 
-Finite = Annotated[float, BeforeValidator(_plain_number), Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
-Positive = Annotated[float, BeforeValidator(_plain_number), Field(gt=0, le=LARGEST, allow_inf_nan=False)]
-NonNegative = Annotated[float, BeforeValidator(_plain_number), Field(ge=0, le=LARGEST, allow_inf_nan=False)]
+# The bounds stand before the check, so that pydantic's core tests them and the JSON schema has them in its own words.
+Finite = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False), BeforeValidator(_plain_number)]
+Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False), BeforeValidator(_plain_number)]
+NonNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False), BeforeValidator(_plain_number)]
+Tilt = Annotated[float, Field(gt=0, le=np.pi, allow_inf_nan=False), BeforeValidator(_plain_number)]
 Whole = Annotated[int, BeforeValidator(_plain_number)]
-Share = Annotated[float, BeforeValidator(_plain_number), Field(gt=0, lt=1, allow_inf_nan=False)]
+Share = Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False), BeforeValidator(_plain_number)]
 Vector3 = tuple[Finite, Finite, Finite]
 Pose = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
 Inertia = tuple[Finite, Finite, Finite, Finite, Finite, Finite]

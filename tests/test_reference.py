@@ -82,6 +82,22 @@ def test_every_key_of_every_part_is_there(model, page, made):
             assert cells[2] or cells[4].strip(" |"), f"{anchor}.{key} has neither unit nor description"
 
 
+@pytest.mark.parametrize("model", SCHEMAS, ids=lambda model: model.__name__)
+def test_ranges_are_in_the_words_of_json_schema(model):
+    """An editor that checks a file ignores keywords that it does not know."""
+
+    def schemas(part):
+        if isinstance(part, dict):
+            yield part
+        for each in part.values() if isinstance(part, dict) else part if isinstance(part, list) else ():
+            yield from schemas(each)
+
+    every = list(schemas(json.loads(SCHEMAS[model].read_text())))
+    numbers = [each for each in every if each.get("type") in ("number", "integer")]
+    assert not [each for each in numbers if {"ge", "gt", "le", "lt"} & {*each}]
+    assert sum("maximum" in each or "exclusiveMaximum" in each for each in numbers) > 100
+
+
 def test_units_and_defaults_are_those_of_the_schema(made):
     """A few rows as they should be, written by hand."""
     robot, task = made["reference/robot-keys.md"], made["reference/task-keys.md"]

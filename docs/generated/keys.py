@@ -136,8 +136,7 @@ def _referred(field: Any) -> list[str]:
 
 def _bounds(field: Schema) -> str:
     """Return the range of a number; the bounds of all numbers in files are left out."""
-    words = {"minimum": ">=", "ge": ">=", "gt": ">", "exclusiveMinimum": ">", "le": "<=", "maximum": "<="}
-    words |= {"lt": "<", "exclusiveMaximum": "<"}
+    words = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
     bounds = [
         f"{sign.replace('>', '&gt;').replace('<', '&lt;')} {round(field[key], 3):.10g}"
         for key, sign in words.items()

@@ -11,7 +11,7 @@ from pydantic.json_schema import SkipJsonSchema
 
 from ...models import shapes
 from ...models.body import THINNEST
-from ...models.part import Box, NonNegative, Part, Positive, Range, Vector3, optional
+from ...models.part import Box, NonNegative, Part, Positive, Range, Tilt, Vector3, optional
 from ..limits.limit import Limit
 
 Distance = Annotated[NonNegative | None, Field(description="least distance [m]; null: no limit")]
@@ -131,7 +131,7 @@ class TaskLimits(Part):
         "acceleration minus gravity along the platform's x and y axes, which makes an open cup spill [m/s^2]"
     )
     platform_turn: Positive | None = optional("angular velocity of the platform [rad/s]")
-    platform_tilt: Positive | None = optional("angle of the platform's z axis to the vertical [rad]", le=np.pi)
+    platform_tilt: Tilt | None = optional("angle of the platform's z axis to the vertical [rad]")
     platform_box: Box | None = optional("box in {G} in which the platform frame's origin stays [m]")
     carrier_speed: Positive | None = optional(
         "speed of every moving carrier, in addition to the robot file's limit [m/s]"

@@ -9,13 +9,16 @@ time-optimal path parameterization based on reachability analysis", IEEE T-RO 34
 from typing import Any, NamedTuple
 
 import numpy as np
-from toppra.algorithm import TOPPRA
-from toppra.constraint import LinearConstraint
-from toppra.constraint.linear_constraint import canlinear_colloc_to_interpolate
-from toppra.interpolator import AbstractGeometricPath
 from typing_extensions import override
 
+from ...base.imported_late import imported_late
 from ...base.quiet import quiet
+
+with imported_late("matplotlib", "pyplot"):  # toppra draws with it if asked to; it loads for longer than most laws take
+    from toppra.algorithm import TOPPRA
+    from toppra.constraint import LinearConstraint
+    from toppra.constraint.linear_constraint import canlinear_colloc_to_interpolate
+    from toppra.interpolator import AbstractGeometricPath
 
 STEEPNESS = 1e-4  # of the largest row along u; toppra drops 1e-8 of x at each step, which must be little beside x
 UNLIMITED = 1e7  # x in toppra's units that no limit has stopped; its own bounds are at 1e8
