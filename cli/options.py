@@ -59,6 +59,14 @@ class Command(TyperCommand):
             reading.files_read.clear()
         return super().invoke(ctx)
 
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return the parameters; Typer would show the type of an argument that may be repeated as `<list[Path]>`."""
+        found: list[Any] = super().get_params(ctx)
+        for one in found:
+            if one.nargs == -1:
+                one.display_type = lambda _: "<path>"
+        return found
+
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """Return the parts of the usage line."""
         return [piece.replace("{", "").replace("}", "") for piece in super().collect_usage_pieces(ctx)]

@@ -40,7 +40,7 @@ METRICS = (
         Default: none.
     --robust SHARE: The tension conditions hold at all accepted poses simultaneously for this fraction, such as 0.95, of
         all robots within the uncertainty of the robot file. Default: the nominal robot only.
-    --box: Box of positions [m]: 'xmin ymin zmin; xmax ymax zmax'. Default: a box about home and the anchors, above the
+    --box: Box of positions [m]: 'xmin ymin zmin; xmax ymax zmax'. Default: a box around home and the anchors, above the
         floor and inside the workspace_box of the robot file.
     --attitude: One attitude 'roll pitch yaw', or a range 'min min min; max max max' [rad]. Default: the attitude at
         home.

@@ -55,7 +55,7 @@ class Moved(ABC):
         return np.zeros((0, self.count))
 
     @abstractmethod
-    def order(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
+    def write_carriers(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
         """Write the carrier references, (c, 3, 6), from accelerations (f,) and the platform's (6,).
 
         The accelerations are those of the current reference plus the corrections of the solution.
@@ -113,7 +113,7 @@ class Freed(Moved):
         return self._placed[:2]
 
     @override
-    def order(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
+    def write_carriers(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
         self._placed[2] = planned + more
         chosen, coordinate = self.freed.T
         carriers[chosen, :, coordinate] = self._placed.T
@@ -122,7 +122,7 @@ class Freed(Moved):
     def rest(self, stage: float, carriers: np.ndarray) -> None:
         """Bring the carriers to rest."""
         slower = np.clip(-self._placed[1] / stage, -self._strongest, self._strongest)
-        self.order(slower, np.zeros(self.count), np.zeros(6), carriers)
+        self.write_carriers(slower, np.zeros(self.count), np.zeros(6), carriers)
 
     @override
     def offsets(self, carriers: np.ndarray) -> np.ndarray | None:
@@ -178,9 +178,9 @@ class Flown(Late, Freed):
         return self._placed[:2]
 
     @override
-    def order(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
+    def write_carriers(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
         self._pending.add(more.tobytes())
-        super().order(planned, more, platform, carriers)
+        super().write_carriers(planned, more, platform, carriers)
 
 
 class Tethered(Late):
@@ -226,7 +226,7 @@ class Tethered(Late):
         return self._now[0, :2]
 
     @override
-    def order(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
+    def write_carriers(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
         self._pending.add(more.tobytes())
         motion = np.zeros((3, 6 + self.count))
         motion[:2, :6], motion[:2, 6:] = self._measured[0].reshape(2, 6), self._now[0, :2]

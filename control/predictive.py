@@ -173,7 +173,7 @@ class Predictive(ComputedTorque):
         if self._steps[0] != stage or self._turned != self._settings["attitude"]:
             self._steps, self._turned = np.full(self._stages, stage), float(self._settings["attitude"])
             self._times = np.concatenate([[0.0], np.cumsum(self._steps)])
-            # What is under way for longer than half of the stages would leave nothing to decide.
+            # If commands took effect only after more than half of the stages, nothing would be left to decide.
             delay = min(2.0 / self._turned, self._times[-1] / 2), stage
             self._moved, reaches = moved_coordinates(self.robot, *self._far, self._strongest, self._boxes, delay)
             self._sizes = self._stages, 12 + 2 * self._moved.count, self.robot.m + self._moved.count
@@ -361,7 +361,7 @@ class Predictive(ComputedTorque):
         pulls = np.minimum(np.maximum(controls[:1, :m], bounds[0]), bounds[1])
         acceleration = (states[1] - states[0] - ramps[0])[6:12] / self._steps[0]
         more = np.clip((controls - planned[:-1])[len(under_way), m:], -self._strongest, self._strongest)
-        self._moved.order(planned[0, m:], more, acceleration, self._carriers[0])
+        self._moved.write_carriers(planned[0, m:], more, acceleration, self._carriers[0])
         return pulls
 
     def _shifted(

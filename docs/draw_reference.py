@@ -1,4 +1,7 @@
-"""Draw the pictures of the reference: frames, Euler angles, and every robot of the library. `make pictures` runs it."""
+"""Draw the pictures of the reference (frames, Euler angles, every robot of the library) and the films of the gallery.
+
+`make pictures` runs it after the examples, whose plans the films show.
+"""
 
 import io
 import subprocess
@@ -7,15 +10,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from towline import available
-from towline.figures import style
+from towline.figures import animation, style
+from towline.statics.scene import scene
+from towline.viewer import read
 
-PICTURES = Path(__file__).parent / "reference" / "pictures"
+PICTURES, GALLERY = Path(__file__).parent / "reference" / "pictures", Path(__file__).parent / "pictures"
+# Plans that have a film, and its speed.
+FILMS = {"three_robots_carry": 2, "four_quadrotors_slot": 2, "cogiro_pick_and_place": 2, "fast_tracks_a_source": 15}
+RATE = 6  # [frames/s]
 WIDTH, COLOURS = 560, 128  # of a small picture: pixels, and shades
 ALMOST_WHITE = 247
 DARK, PLATFORM = "#333333", style.COLOURS[0]
@@ -28,6 +37,8 @@ def main() -> None:
         shrink(style.save(canvas, PICTURES / f"{name}.png"), 1040)
     for name in available():
         small(name, PICTURES / "robots" / f"{name}.png")
+    for name, speed in FILMS.items():
+        film(GALLERY / f"{name}.nc", speed)
 
 
 def frames() -> Figure:
@@ -100,6 +111,14 @@ def small(name: str, file: Path) -> None:
     command = [sys.executable, "-m", "towline.cli.entry", "robots", name, "--figure", str(file)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     shrink(file, WIDTH)
+
+
+def film(plan: Path, speed: float) -> None:
+    """Draw the film of a plan beside it, as `Plan.animate` does."""
+    with xr.open_dataset(plan) as trajectory:
+        path, times = plan.with_suffix(".gif"), trajectory["time"].values
+        when = animation.timing(path, float(times[-1] - times[0]), speed, RATE)
+        animation.draw(scene(read(plan).robot, trajectory, when.times), when, path)
 
 
 def shrink(file: Path, width: int) -> None:

@@ -162,7 +162,7 @@ def fly(
 def _wrench(begun: Sequence[tuple[float, Event]], time: float, period: float, motions: np.ndarray) -> np.ndarray:
     """Return what events exert on platform and carriers on average in the period from `time` on, (N, 1 + c, 6).
 
-    Each has begun with the period after its time, and lasts as long as it should, so that its impulse is right.
+    An event begins with the first period after its time, and the last period counts in part, for the right impulse.
     """
     total = np.zeros((*motions.shape[:2], 6))
     for begins, event in begun:

@@ -112,6 +112,6 @@ def test_a_carrier_at_the_side_of_its_box_is_expected_to_stay_there():
     box = np.full((1, 3), -0.1), np.full((1, 3), 0.1)
     freed = Freed(np.array([[0.5, 0.0, 0.0, 0.0, 0.0, 0.0]]), 5.0, box)
     freed.now(0.0, np.zeros((2, 12)), np.array([[0.09], [1.0], [0.0]]))
-    freed.order(np.zeros(1), np.zeros(1), np.zeros(6), np.zeros((1, 3, 6)))
+    freed.write_carriers(np.zeros(1), np.zeros(1), np.zeros(6), np.zeros((1, 3, 6)))
     place, rate = freed.now(0.02, np.zeros((2, 12)), np.zeros((3, 1)))
     assert (place, rate) == (0.1, 0.0)

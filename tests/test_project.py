@@ -94,11 +94,13 @@ def test_every_dependency_has_a_lower_bound():
 
 
 def test_the_gallery_has_every_picture():
-    """Those of the reference illustrate its pages."""
+    """Or the film of the same motion. Those of the reference illustrate its pages."""
     page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
-    drawn = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.png")}
+    drawn = {path.relative_to(ROOT / "docs").with_suffix("").as_posix() for path in (ROOT / "docs").rglob("*.png")}
     drawn = {path for path in drawn if not path.startswith("reference/")}
-    assert {path for path in targets(page) if path.endswith(".png")} == drawn
+    shown = [path for path in targets(page) if path.endswith((".png", ".gif"))]
+    assert {path.rpartition(".")[0] for path in shown} == drawn
+    assert all((ROOT / "docs" / path).exists() for path in shown)
 
 
 @pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("adding-a-*.md")), ids=lambda page: page.stem)

@@ -1,5 +1,6 @@
 """The reference has what the code has: every command and option, key, status word and robot; pictures stay small."""
 
+import ast
 import json
 import sys
 from itertools import pairwise
@@ -9,12 +10,11 @@ import pytest
 import typer
 from PIL import Image
 
-from towline import Robot, Task, available, design, load, plan, simulate
+from towline import Robot, Task, available, design, load, plan
 from towline.cli.main import COMMANDS, app
 from towline.control.command import ANSWERS
 from towline.ocp import MotionStatus
 from towline.ocp.sweeps.row import FAILED
-from towline.simulation.flights import report as report_of_runs
 from towline.solvers import Status
 from towline.studies.accounts.claim import Verdict
 
@@ -138,37 +138,83 @@ def test_every_status_word_is_explained():
 
 
 def test_every_row_of_reports_is_explained():
-    """Rows of plans that are feasible and not, of simulations, one and many, and of designs, possible and not."""
+    """Rows of plans that are feasible and not, and of an impossible design, with those whose names are computed."""
     page = {part.partition("\n")[0]: part for part in (REFERENCE / "reports.md").read_text().split("\n## ")}
-    robot, team = load("wang-flying"), load("multi-quadrotor-3")
+    robot = load("wang-flying")
     rest = {"path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 0.5}
     side = {"path": {"kind": "line", "start": [0, 0, -1], "end": [0.8, 0, -1]}, "duration": 0.5}
-    turns = {"path": {"kind": "waypoints", "points": [[0, 0, -1], [0.05, 0, -1.1], [0, 0, -1.2]]}, "duration": 3}
-    flown = {"path": {"kind": "line", "start": [0, 0, 0], "end": [0.1, 0, 0]}, "duration": 2, "base": {"kind": "free"}}
-    motions = [(robot, {**rest, "wind": [1, 0, 0]}), (robot, side), (robot, turns), (team, flown)]
-    plans = [plan(who, task) for who, task in motions]
-    assert [found.status for found in plans] == ["feasible", "infeasible", "feasible", "feasible"]
-    runs = [simulate(robot, plans[0], duration=0.1), simulate(robot, plans[0], duration=0.1, events=["cut 1 at 0.02"])]
-    runs.append(simulate(robot, plans[0], duration=0.1, mismatch={"mass": [0.9, 1.1]}, tolerance=1e-9))
-    many = simulate(robot, plans[0], duration=0.1, mismatch={"mass": [0.9, 1.1]}, tolerance=1e-9, runs=2)
+    flown = {"path": {"kind": "line", "start": [0, 0, -1], "end": [0.1, 0, -1]}, "duration": 2, "steps": 8}
+    plans = [plan(robot, task) for task in ({**rest, "wind": [1, 0, 0]}, side, {**flown, "base": {"kind": "free"}})]
+    assert [found.status for found in plans] == ["feasible", "infeasible", "feasible"]
     free = [{"part": "t_max", "range": {"min": 20, "max": 500}, "equal": True}]
-    lift = {"name": "lift", "path": {"kind": "line", "start": [0, 0, 2.4], "end": [0, 0, 2.6]}, "duration": 2}
-    near, far = ([{"poses": [[x, 0, 2.5, 0, 0, 0]]}] for x in (0, 9))
-    designs = [design("ipanema-2", free, near, time_limit=0.2, tasks=[lift]), design("ipanema-2", free, far)]
-    designs.append(design("ipanema-2", free, near, time_limit=0.2, margin=1e4))
-    assert [found.status for found in designs[:2]] == ["feasible", "infeasible"]
-    names = {carrier.name for who in (robot, team) for carrier in who.carriers} | {""}
-    reports = [result._report() for result in runs] + [report_of_runs(many)]
-    for results, section in (
-        ([found._report() for found in plans], "Plans"),
-        (reports, "Simulations"),
-        ([found._report() for found in designs], "Designs"),
-    ):
+    impossible = design("ipanema-2", free, [{"poses": [[9, 0, 2.5, 0, 0, 0]]}])
+    assert impossible.status == "infeasible"
+    names = {carrier.name for carrier in robot.carriers} | {""}
+    for results, section in ((plans, "Plans"), ([impossible], "Designs")):
         for result in results:
-            parts = [part for part in result.parts if hasattr(part, "facts")]
+            parts = [part for part in result._report().parts if hasattr(part, "facts")]
             rows = {name for part in parts for name, _ in part.facts} - names
             assert rows
             assert not [name for name in rows if f"`{name}`" not in page[section]]
+
+
+ROWS = {  # the modules that write the reports of a section
+    "Plans": [f"ocp/reports/{name}.py" for name in ("ideas", "motion_facts", "reasons", "report")],
+    "Simulations": ["simulation/simulation.py", "simulation/flights.py"],
+    "Designs": ["layout/result.py", "layout/impossibility.py"],
+    "Replays": ["simulation/log_replay.py"],
+}
+# Rows without a name, files of pages, rows of `repr` alone, and words of a sentence.
+NO_ROWS = {
+    "",
+    "The robot's file",
+    "Complete task, defaults included (frame: world is {G})",
+    "poses",
+    "audited",
+    "starts",
+}
+NO_ROWS |= {"the best of all pairings at the poses of the grid"}
+
+
+def text_of(node):
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
+
+
+def rows_in(function):
+    """Yield the names of rows that a function writes as pairs or into a dict, unless they are computed."""
+    for node in ast.walk(function):
+        if isinstance(node, ast.Tuple) and len(node.elts) == 2:
+            yield text_of(node.elts[0])
+        elif isinstance(node, ast.Dict) and function.name == "_facts":
+            yield from map(text_of, node.keys)
+        elif isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Subscript):
+            yield text_of(node.targets[0].slice)
+
+
+def functions(*files):
+    for file in files:
+        yield from (node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.FunctionDef))
+
+
+def test_every_row_that_the_code_names_is_explained():
+    """Those that few results have, too: they are read from the code."""
+    page = {part.partition("\n")[0]: part for part in (REFERENCE / "reports.md").read_text().split("\n## ")}
+    for section, files in ROWS.items():
+        found = functions(*(ROOT / file for file in files))
+        kept = [
+            one
+            for one in found
+            if one.name.strip("_") == "report" or (one.returns and "Fact" in ast.unparse(one.returns))
+        ]
+        rows = {row for function in kept for row in rows_in(function)} - NO_ROWS
+        assert len(rows) > 3
+        assert not [row for row in rows if f"`{row}`" not in page[section]], section
+    changes = functions(*(ROOT / "ocp" / "search").glob("*.py"))
+    calls = [node for one in changes for node in ast.walk(one) if isinstance(node, ast.Call) and node.args]
+    named = [node.args[0] for node in calls if ast.unparse(node.func) in ("Change", "Relaxed")]
+    offered = {text_of(name) for name in named} - {""}
+    assert len(offered) > 10
+    assert not [name for name in offered if f"`feasible {name}`" not in page["Plans"]]
 
 
 def test_the_glossary_is_in_order_and_has_the_words_of_robots():

@@ -26,7 +26,7 @@ class Live:
         self._server, self._busy, self._first = server, threading.RLock(), subject
         self._robots = tuple(dict.fromkeys([*available(), subject.robot.name]))
         self._show(subject)
-        server.on_client_connect(lambda client: self._stage.mind(client))
+        server.on_client_connect(lambda client: self._stage.fit_to_screen(client))
 
     def _show(self, subject: Subject) -> None:
         self._subject = subject
@@ -48,7 +48,7 @@ class Live:
             self._server.scene.reset()
             self._show(subject)
             for client in self._server.get_clients().values():
-                self._stage.mind(client, frame=True)
+                self._stage.fit_to_screen(client, frame=True)
 
     def follow(self, query: str) -> None:
         """Show the robot and the pose of a link, in a thread of its own; what is no link of ours is ignored."""

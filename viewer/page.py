@@ -17,7 +17,7 @@ SCRIPT, CAMERA = (Path(__file__).with_name(name).read_text(encoding="utf-8") for
 
 
 def camera(centre: np.ndarray, along: np.ndarray, nearest: float) -> str:
-    """Return the script that moves the initial camera away from the robot on a screen that is higher than wide.
+    """Return the script that moves the initial camera away from the robot on portrait screens.
 
     It looks at `centre` from the direction `along`, (3,) each in {G} [m], at the distance `nearest` [m] on a screen
     that is wider than high.

@@ -142,7 +142,7 @@ class Stage:
     def frame(self, camera: Any, width: float, height: float, view: str = "all") -> None:
         """Point a camera at the whole robot, by default from the front, a little from the side and above.
 
-        In a picture that is higher than wide, as on a phone, the camera is farther away, and the robot above the panel.
+        In portrait pictures, as on a phone, the camera is farther away, and the robot above the panel.
 
         - `camera`: of viser: the initial one, or that of a client.
         - `width`, `height`: of its picture [pixels].
@@ -166,7 +166,7 @@ class Stage:
         with self._turning:
             self._left = True
 
-    def mind(self, client: viser.ClientHandle, frame: bool = False) -> None:
+    def fit_to_screen(self, client: viser.ClientHandle, frame: bool = False) -> None:
         """Fit the camera to portrait screens, now and whenever a screen is turned.
 
         The initial camera may reach a browser after this one, and a user can return to it. A camera that a user has

@@ -59,7 +59,7 @@ class Counts:
             self.high = np.maximum(self.high, position[held].max(axis=0))
         self.tried += len(places)
 
-    def keep(self, samples: np.ndarray, flags: np.ndarray) -> None:
+    def keep_samples(self, samples: np.ndarray, flags: np.ndarray) -> None:
         """Keep samples (n, k) and their flags (n,), up to the storage limit."""
         self.samples.append(samples[: self.left])
         self.flags.append(flags[: self.left])
@@ -71,7 +71,7 @@ class Counts:
         self.cells += other.cells
         self.low, self.high = np.minimum(self.low, other.low), np.maximum(self.high, other.high)
         for samples, flags in zip(other.samples, other.flags, strict=True):
-            self.keep(samples, flags)
+            self.keep_samples(samples, flags)
 
 
 def _cell(position: np.ndarray, domain: Domain, cells: tuple[int, ...]) -> np.ndarray:
@@ -127,6 +127,6 @@ class Counter(Displayed):
                     rows = slice(None) if self.keep == "all" else held
                     kept = places.only(rows)
                     values = [metric_values(name, self.domain.robot, kept) for name in self.metrics]
-                    counts.keep(np.column_stack([self.domain.numbers(kept), *values]), held[rows])
+                    counts.keep_samples(np.column_stack([self.domain.numbers(kept), *values]), held[rows])
                 flags.append(np.packbits(held).tobytes())
         return counts, flags

@@ -111,8 +111,8 @@ void towline_tethered_coordinates(const towline_robot *robot, int count, const t
                                   const double *motions, double *coordinates);
 
 /*
- * Write how carriers move, (c, 3, 6), if the platform and the coordinates do as (3, 6 + f) says; attitudes are read, and
- * stay.
+ * Write the motion of carriers, (c, 3, 6), from that of the platform and the coordinates, (3, 6 + f). Attitudes are read,
+ * and stay.
  */
 void towline_tethered_carriers(const towline_robot *robot, int count, const towline_tether *tethers,
                                const double *motion, double *carriers);

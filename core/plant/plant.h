@@ -1,7 +1,7 @@
 /*
- * A robot in forward time: what platform, carriers and cables do for commands, in wind, step by step.
+ * The simulation of a robot, step by step: the response of platform, carriers and cables to commands and wind.
  *
- * A state is a row of numbers, and all that a plant remembers. It has 13 for each body, the platform first: position
+ * A state is one array, and a plant keeps no other memory. It has 13 for each body, the platform first: position
  * [m] (of the platform's CoM, of a carrier's frame), quaternion (w, x, y, z), velocity in {G} [m/s], rate in the body's
  * own axes [rad/s]. Then it has for all cables the unstrained lengths [m] (tensions [N] where these are commanded),
  * their rates, the lengths last commanded, and the conditions.

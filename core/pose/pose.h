@@ -29,7 +29,8 @@ void towline_pose_from_lengths(const towline_robot *robot, ptrdiff_t rows, towli
 
 /*
  * Covariances (rows, 6, 6) of x, y, z and a small rotation in {G} at poses (rows, 6): zero for coordinates in which the
- * platform cannot move, and infinite where the lengths leave a motion open. Of `measured`, lengths and damping are not read.
+ * platform cannot move, and infinite where the lengths do not determine the pose. Lengths and damping of `measured` are
+ * not read.
  */
 void towline_pose_covariance(const towline_robot *robot, ptrdiff_t rows, towline_lengths measured, const double *poses,
                              double *covariances);

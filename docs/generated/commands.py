@@ -19,7 +19,7 @@ HEAD = """# Commands
 
 
 def commands() -> str:
-    """Return the page."""
+    """Return the page of commands."""
     group = typer.main.get_command(app)
     context = typer.Context(group, info_name="towline")
     lines = [f"- [`towline {name}`](#{name}): {escaped(meaning)}" for name, meaning in COMMANDS.items()]

@@ -19,7 +19,7 @@ you move the platform.
 
 
 def robots() -> str:
-    """Return the page."""
+    """Return the page of the library's robots."""
     rows, sections = [], []
     for entry in contents():
         name = entry["name"]

@@ -51,7 +51,7 @@ class Audit(Displayed):
 
     @cached_property
     def limited(self) -> list[np.ndarray]:
-        """Return what each limit bounds, (n, k) in its unit; nan where a limit is not in force."""
+        """Return the limited quantities of each limit, (n, k) in its unit; nan where it is not in force."""
         return self.limiting()
 
     @cached_property
