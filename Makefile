@@ -3,8 +3,10 @@ PYTHON ?= python3
 BIN := .venv/bin
 # Empty is off. Where it is set, each of the hundreds of processes that the tests start compiles all modules anew.
 export PYTHONDONTWRITEBYTECODE :=
+# uv downloads and unpacks on all processors; pip installs where only its own settings name an index that can be reached.
 # Modules are compiled when they are first imported; most never are.
-INSTALL := $(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check --constraint constraints.txt --editable
+PIP := $(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check --constraint constraints.txt
+UV := $(BIN)/uv pip install --python $(BIN)/python --quiet --constraint constraints.txt
 # What developers' core is compiled without; `make WARNINGS= test` is for compilers that have others.
 WARNINGS := -pedantic -Wall -Wextra -Wconversion -Werror -Wno-psabi
 # What the extension is built from.
@@ -47,7 +49,7 @@ docs: .venv/dev.stamp
 # The core for the page that computes. The package ziglang compiles to WebAssembly wherever it is installed; the sources' hash is
 # the file's build ID, by which a test finds a file that is older than they are.
 live: .venv/venv.stamp
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --target build/ziglang --upgrade ziglang
+	$(PIP) --target build/ziglang --upgrade ziglang
 	PYTHONPATH=build/ziglang $(BIN)/python -m ziglang cc --target=wasm32-wasi -mexec-model=reactor -Os -s -Wall -Wextra -Werror \
 	  -ffp-contract=off -fno-math-errno -fno-trapping-math -DTOWLINE_CABLES=32 -DTOWLINE_NO_LANES -Icore -Icore/distribution \
 	  -Wl,-z,stack-size=262144 -Wl,--build-id=0x$$(cat $(LIVE) | sha256sum | cut -d ' ' -f 1) -o viewer/live/robot_at_rest.wasm \
@@ -85,15 +87,17 @@ clean:
 .venv/venv.stamp:
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "towline needs python3 >= 3.11, this is " + sys.version.split()[0] + ": make PYTHON=python3.11")'
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --upgrade pip
+	-$(PIP) uv
 	touch $@
 
 .venv/core.stamp: pyproject.toml constraints.txt $(CORE) | .venv/venv.stamp
-	$(INSTALL) .
+	$(UV) --editable . || $(PIP) --editable .
 	touch $@
 
 # One installation, not one after the core's: each builds towline anew. Some warnings are due only where compilers optimise;
 # the tests take what this compiles for the wheel.
+.venv/dev.stamp: export CFLAGS := $(WARNINGS)
+.venv/dev.stamp: EXTRAS := .[bench,cluster,dev,docs,fmu,logs,mesh,mujoco,notebooks,timing,viewer]
 .venv/dev.stamp: pyproject.toml constraints.txt $(CORE) | .venv/venv.stamp
-	CFLAGS="$(WARNINGS)" $(INSTALL) ".[bench,cluster,dev,docs,fmu,logs,mesh,mujoco,notebooks,timing,viewer]"
+	$(UV) --editable "$(EXTRAS)" || $(PIP) --editable "$(EXTRAS)"
 	touch .venv/core.stamp $@
