@@ -42,10 +42,11 @@ from .watching import counting, watching
         uncertainty of the robot file; default: the task's value.
     --vary KEY=VALUES: Plan once per value of a field: 'margin=0:20:5' (start:stop:step), 'duration=4,6,8',
         'scheme=linear,hermite'. KEY is a dotted key of the task, such as tube.position, or of the robot, such as
-        robot.platform.mass. 'robot=cogiro,my.yaml' and 'task=a.yaml,b.yaml' vary the whole robot or task. Repeat the
-        option to plan all combinations. Writes one table instead of one plan: --out names its NetCDF file, and a CSV
-        file of the same name is written too (default: ROBOT-TASK-sweep.nc). --figures draws sweep.png with feasibility,
-        cost and margin. The exit code is 1 if no plan is feasible.
+        robot.platform.mass. 'robot.cables[2].t_max=5000,cut' plans with the third cable and without it.
+        'robot=cogiro,my.yaml' and 'task=a.yaml,b.yaml' vary the whole robot or task. Repeat the option to plan all
+        combinations. Writes one table instead of one plan: --out names its NetCDF file, and a CSV file of the same name
+        is written too (default: ROBOT-TASK-sweep.nc). --figures draws sweep.png with feasibility, cost and margin. The
+        exit code is 1 if no plan is feasible.
 {long_run("With --vary: ")}
     --keep FOLDER: With --vary: folder in which to save every plan (NetCDF).
 """)

@@ -95,6 +95,18 @@ def test_values_of_the_robot_vary_too(swept):
     assert table["robot.cables.t_max"].attrs["units"] == "N"
 
 
+def test_a_cable_that_is_cut_carries_nothing():
+    """Of three equal vertical cables, those that are left share the load, whatever number they had."""
+    three = hoist().model_copy(update={"cables": (hoist().cables[0],) * 3})
+    table = sweep(three, LIFT, {"robot.cables[2].t_max": ["cut", 90], "robot.cables[0].t_max": [90, "cut"]}).table
+    np.testing.assert_allclose(table["tension_max"], ends(1.2)[1] / np.array([[2, 1], [3, 2]]), rtol=1e-4)
+    assert table["robot.cables[2].t_max"].attrs["units"] == "N"
+    with pytest.raises(InputError, match=r"cables must have at least 1 item, got 0 .with robot.cables.t_max = cut"):
+        sweep(three, LIFT, {"robot.cables.t_max": ["cut"]})
+    with pytest.raises(InputError, match="must be a mapping with carrier"):
+        sweep(three, LIFT, {"robot.cables[0]": ["cut"]})
+
+
 def test_whole_robots_and_tasks_vary_and_fields_of_each(folder, monkeypatch):
     """A matrix of two tasks and three robots, of which one cannot do the task with wind, and a field of both."""
     monkeypatch.chdir(folder)

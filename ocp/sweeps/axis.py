@@ -245,7 +245,7 @@ class Field(Displayed):
         description, step = "", ""
         for step in () if self.whole else self.steps:
             if isinstance(step, int):
-                part = part[step]  # an item has its list's unit
+                part = part[min(step, len(part) - 1)]  # an item has its list's unit; cut cables are gone
                 continue
             if isinstance(part, tuple):
                 part = part[0]

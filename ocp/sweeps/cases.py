@@ -13,6 +13,8 @@ from ..tasks.lay_out import lay_out
 from ..tasks.task import Task, read_task
 from .axis import Axis
 
+CUT = "cut"  # as a cable's t_max: the robot is without this cable
+
 
 def _data_of(task: Task) -> dict[str, Any]:
     """Return the fields of a task that are set, as a mapping."""
@@ -84,6 +86,10 @@ class Cases:
             data: Any = robot.model_dump(exclude_unset=True)
             for axis, index in parts:
                 data = axis.field.set(data, axis.values[index])
+            if any(axis.values[index] == CUT for axis, index in parts):  # last, since the numbers of the others change
+                data["cables"] = [
+                    each for each in data["cables"] if not (isinstance(each, dict) and each.get("t_max") == CUT)
+                ]
             self._robots[place] = validate(data, Robot, f"robot {robot.name!r}")
         return self._robots[place] if parts else robot
 
