@@ -171,11 +171,11 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
 
     movable, attitude = any(carrier.moves for carrier in robot.carriers), "in its home attitude"
     held = f"{attitude} and with its carriers at home" if movable else attitude
-    if box is None and robot.fixed_lengths is not None:
-        return ["  no box of positions at which it can rest is known"]
     if box is None:
         hint = ["    (in a plan with `base: {kind: free}` the carriers can move too)"] if movable else []
-        return [f"  cannot rest, {held}, at any of the sampled positions", *hint]
+        unknown = "no box of positions at which it can rest is known, with the carriers placed as at home"
+        sampled = f"cannot rest, {held}, at any of the sampled positions"
+        return [f"  {sampled if robot.fixed_lengths is None else unknown}", *hint]
     sides = [
         f"{'xyz'[axis]} {quantity_range([box.low[axis], box.high[axis]], 'm', 3)}"
         if np.isfinite(box.high[axis])
