@@ -19,8 +19,9 @@ from .outputs import Outputs, check_outputs
         of one motion are accepted, such as one for each computer; the log of a carrier is named after it, as quad1.csv.
     --poses LOG: Log of the poses, if they are in another file; its clock is aligned by comparing cable speeds.
     --free NAMES: Parameters to estimate, separated by commas: anchors, attachments, offsets, scales, radii, build-up,
-        clock, frame and body (of measured poses), com; with tensions also mass, stiffness, capstan, friction, gains,
-        zeros; or auto. Default: anchors, offsets, and clock if the log records times and poses of a motion.
+        clock, frame and body (of measured poses), com, elasticity; with tensions also mass, stiffness, capstan,
+        friction, gains, zeros; or auto. Default: anchors, offsets, and clock if the log records times and poses of a
+        motion.
     --prior NAME=SIGMA,...: Standard deviations of the file's values, in their units, such as
         'anchors=0.02,offsets=0.05'; default: unobservable directions stay as close to the file as possible.
     --sigma SIGMA|NAME=SIGMA,...: Standard deviation of the lengths [m], or of lengths [m], position [m], rotation

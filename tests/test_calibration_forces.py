@@ -13,7 +13,7 @@ from towline.base.errors import InputError
 from towline.estimation.calibration import Measurements, calibrate
 from towline.estimation.calibration.balance import FeltTensions
 from towline.estimation.calibration.model import Model
-from towline.estimation.calibration.parameters import GROUPS, OF_CABLE, Parameters
+from towline.estimation.calibration.parameters import COMMON, FRAMES, GROUPS, OF_CABLE, Parameters
 from towline.estimation.logs.load_cells import slack
 from towline.models import Robot, load
 from towline.models.files import as_robot
@@ -191,14 +191,15 @@ def test_gradients_are_slopes_of_the_cost(name):
     state = model.begin()._replace(errors=draw.normal(size=(count, 2)))
     model.parameters.table(state.x)[:, 10:13] = 1e-6, 0.05, 1.0
     varies, last = model.parameters.varies, model.parameters.clock
-    state.x[last + 5 :] = 0.3 * draw.normal(size=12) * varies[last + 5 :]  # the frames of the poses
+    state.x[last:][FRAMES] = 0.3 * draw.normal(size=12) * varies[last:][FRAMES]  # the frames of the poses
+    small = [*range(10, last, OF_CABLE), last + COMMON]  # compliances
     residuals, derivatives = model.linearised(state)
     exact = np.einsum("nip,ni->p", derivatives.balance.by_parameters, residuals.balance)
     exact[last:][varies[last:]] += np.einsum("mn,mnk->k", residuals.readings, derivatives.others)
     for i in range(robot.m):
         exact[i * OF_CABLE : (i + 1) * OF_CABLE] += residuals.readings[i] @ derivatives.cables[i]
     for column in np.flatnonzero(varies):
-        step = 1e-6 * np.eye(len(state.x))[column] * (1e-6 if column < last and column % OF_CABLE == 10 else 1.0)
+        step = 1e-6 * np.eye(len(state.x))[column] * (1e-6 if column in small else 1.0)
         more, less = (model.cost(state._replace(x=state.x + sign * step)) for sign in (1, -1))
         assert (more - less) / (4 * step.max()) == pytest.approx(exact[column], rel=1e-3, abs=1e-4 * abs(exact).max())
     of_pose = np.einsum("mnc,mn->nc", derivatives.poses, residuals.readings)
@@ -211,6 +212,40 @@ def test_gradients_are_slopes_of_the_cost(name):
         np.testing.assert_allclose(slope / 4e-6, of_pose[:, axis], rtol=1e-3, atol=1e-5 * abs(of_pose).max())
 
 
+def hanging(seed, compliance):
+    """A point mass on three cables, whose tensions are those of its weight and acceleration; file and log."""
+    rng, t = np.random.default_rng(seed), np.arange(0, 30, 0.1)
+    directions = 2 * np.pi * np.arange(3) / 3
+    anchors = np.column_stack([3 * np.cos(directions), 3 * np.sin(directions), np.full(3, 4.0)])
+    rates, size, begin = np.array([0.9, 0.7, 1.1]), np.array([0.9, 0.9, 0.5]), rng.uniform(0, 6, 3)
+    p = size * np.sin(rates * t[:, None] + begin) + [0, 0, 1.2]
+    acceleration = -(rates**2) * size * np.sin(rates * t[:, None] + begin)
+    away = anchors - p[:, None]
+    lengths = np.linalg.norm(away, axis=2)
+    u = np.swapaxes(away / lengths[..., None], 1, 2)
+    tensions = np.linalg.solve(u, MASS * (acceleration - GRAVITY)[..., None])[..., 0]
+    assert tensions.min() > 5
+    noise = rng.normal(0, 3e-4, (2, *p.shape))
+    readings = lengths / (1 + compliance * tensions) + noise[0]
+    robot = robot_file(
+        anchors + rng.normal(0, 0.02, (3, 3)), np.zeros((3, 3)), [0, 0, 0], MASS, [0, 0, 1.2, 0, 0, 0], "xyz"
+    )
+    return anchors, robot, Measurements(readings, poses=np.pad(p + noise[1], ((0, 0), (0, 3))), times=t)
+
+
+def test_stretch_of_cables_is_found_by_the_weight_that_hangs_from_them():
+    anchors, robot, log = hanging(1, 2e-5)
+    found = calibrate(robot, log)
+    stretch = found.parameters[-1]
+    assert stretch.name == "compliance"
+    assert abs(stretch.value - 2e-5) < 3 * stretch.sigma < 1e-5
+    assert [1 / cable.stiffness for cable in found.robot.cables] == pytest.approx([stretch.value] * 3)
+    assert "cables stretch: E A is" in str(found.report())
+    wrong = np.array([cable.anchor for cable in found.robot.cables]) - anchors
+    assert np.linalg.norm(wrong, axis=1).max() < 6e-3  # 20 mm and more without stretch
+    assert "elasticity" not in calibrate(*hanging(1, 0.0)[1:]).free
+
+
 def test_wrong_requests_are_one_line():
     _, readings, angles, tensions, _ = rests(0)
     weightless = drawn().model_copy(update={"gravity": (0.0, 0.0, 0.0)})
@@ -220,6 +255,8 @@ def test_wrong_requests_are_one_line():
         calibrate("cogiro", Measurements(np.full((30, 8), 9.0)), "com")
     with pytest.raises(InputError, match="tensions must be given to estimate stiffness"):
         calibrate("cogiro", Measurements(np.full((30, 8), 9.0)), "stiffness")
+    with pytest.raises(InputError, match="tensions must be given to estimate elasticity"):
+        calibrate("cogiro", Measurements(np.full((30, 8), 9.0)), "elasticity")
     with pytest.raises(InputError, match=r"sigma.tensions must be a number from 1e-06 to 100, got 0"):
         Measurements(readings, sigma={"tensions": 0})
 

@@ -68,8 +68,17 @@ class _Forces(NamedTuple):
     inner: np.ndarray
     variances: np.ndarray
     inverse_root: np.ndarray | None
+    reduced: np.ndarray | None  # residuals in standard deviations
     pull: np.ndarray
     by_arm: np.ndarray
+
+    @property
+    def most_likely(self) -> np.ndarray:
+        """Return the tensions that the balance makes most likely [N], (N, m), or as they are if it is not finite."""
+        if self.inverse_root is None or self.reduced is None:
+            return self.tensions
+        behind = (np.swapaxes(self.inverse_root, 1, 2) @ self.reduced[..., None])[..., 0]
+        return np.asarray(self.tensions - self.variances * np.einsum("nim,ni->nm", self.inner, behind))
 
 
 class _Log:
@@ -194,8 +203,10 @@ class Balance:
         own = (noise * OWN * robot.weight) ** 2 + (robot.platform.mass * motion.sigma) ** 2
         M[:, np.arange(len(rows)), np.arange(len(rows))] += np.reshape(own, (-1, 1))
         finite = np.isfinite(M).all() and np.isfinite(r).all()
-        inverse_root = np.linalg.inv(np.linalg.cholesky(M)) if finite else None
-        return _Forces(record, poses, tensions, by_tensions, A, r, inner, variances, inverse_root, pull, motion.by_arm)
+        root = np.linalg.inv(np.linalg.cholesky(M)) if finite else None
+        reduced = None if root is None else (root @ (r[:, rows] * self._scale)[..., None])[..., 0]
+        felt = record, poses, tensions, by_tensions
+        return _Forces(*felt, A, r, inner, variances, root, reduced, pull, motion.by_arm)
 
     def masses(
         self, of: Parameters, x: np.ndarray, placed: tuple[np.ndarray, np.ndarray], clock: float
@@ -209,6 +220,17 @@ class Balance:
         down = forces.pull / (forces.pull**2).sum(axis=1, keepdims=True)
         masses = x[of.clock + 1] - np.einsum("ni,ni->n", forces.r[:, :3], down)
         return masses, np.einsum("nim,ni->nm", forces.A[:, :3], down) * self._log.terms[0][0, self._chosen]
+
+    def carrying(
+        self, of: Parameters, x: np.ndarray, placed: tuple[np.ndarray, np.ndarray], clock: float
+    ) -> np.ndarray:
+        """Return the tensions by weight and inertia of a platform that `hangs` [N], (N, m). Arguments as for `at`."""
+        return self._forces(of, x, placed, clock, 1.0).most_likely
+
+    def smoothed(self, tensions: np.ndarray) -> np.ndarray:
+        """Return tensions of the whole log (N, m) [N], smoothed if it is that of a motion."""
+        smooth = self._log.motion.smooth
+        return tensions if smooth is None else smooth.values(tensions[None])[0]
 
     def felt(self, table: np.ndarray, noise: float) -> FeltTensions:
         """Return the measured tensions, smoothed, with errors that make cables seem stiffer unless they are unknowns.
@@ -237,17 +259,15 @@ class Balance:
         robot, rows, scale, rotation = self._robot, self._rows, self._scale, placed[1]
         table, m, count = of.table(x), robot.m, len(rotation)
         of_log = self._forces(of, x, placed, clock, noise)
-        inverse_root, A, r, inner = of_log.inverse_root, of_log.A, of_log.r, of_log.inner
-        if inverse_root is None:
+        inverse_root, A, r = of_log.inverse_root, of_log.A, of_log.r
+        if inverse_root is None or of_log.reduced is None:
             return Balanced(np.full((count, 6), np.inf))
         gain = float(table[:, 13].mean())
-        reduced = inverse_root @ (r[:, rows] * (scale / gain))[..., None]
         residuals = np.zeros((count, 6))
-        residuals[:, rows] = reduced[..., 0]
+        residuals[:, rows] = of_log.reduced / gain
         if not derive:
             return Balanced(residuals)
-        behind = (np.swapaxes(inverse_root, 1, 2) @ reduced)[..., 0]
-        tensions = of_log.tensions - gain * of_log.variances * np.einsum("nim,ni->nm", inner, behind)
+        tensions = of_log.most_likely
         mass, arm = x[of.clock + 1], rotation @ x[of.clock + 2 : of.clock + 5]
         pull, by_arm = of_log.pull, of_log.by_arm
         raw = np.zeros((count, 6, of.count))
@@ -274,6 +294,16 @@ class Balance:
             return result
 
         return Balanced(residuals, reduce(raw), reduce(by_pose))
+
+
+def hangs(robot: Robot, measurements: Measurements) -> bool:
+    """Return whether weight and inertia of a platform determine the tensions of its cables, of which none are measured.
+
+    If no reading ever changes, winches are locked and the platform swings.
+    """
+    few = measurements.tensions is None and robot.m <= robot.dof_mask.sum() and robot.weight > 0
+    locked = np.array_equal(measurements.lengths[1:], measurements.lengths[:-1])
+    return bool(few and not locked and not any(carrier.actuators for carrier in robot.carriers))
 
 
 def needs_balance(robot: Robot, measurements: Measurements) -> bool:

@@ -14,13 +14,14 @@ from ...base.display import Displayed
 from ...base.errors import InputError
 from ...models.robot import Robot
 from ..logs.measurements import Measurements
-from .balance import needs_balance
+from .balance import hangs, needs_balance
 from .fit import fit
 from .geometry import length_of
 from .model import Model, State
 from .parameters import IN_BALANCE, Parameters
 from .solving import (
     Solved,
+    carrying,
     check_enough,
     cleaned,
     covariance_of,
@@ -119,11 +120,12 @@ def compare(solved: Solved, free: tuple[str, ...], prior: dict[str, float]) -> H
 def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[str, ...]:
     """Return the smallest parameter set whose cross-validation error is close to the best.
 
-    The sets are empty (the file), offsets alone, anchors, both, and these with attachments, scales, build-up, pulley
-    radii and, with tensions, stiffness; with a clock offset if times and poses of a motion were measured. Attachments
-    are left out if the platform hardly turns. Before, mass, CoM and friction are added one by one if they let the
-    balance of forces of the validation samples be predicted better. With `outliers`, slips and outliers are removed
-    first. Raises `InputError` if there are too few measurements even for the offsets.
+    The sets are empty (the file), offsets alone, anchors, both, and these with attachments, scales, build-up,
+    pulley radii and, with tensions, stiffness, or elasticity if weight determines the tensions; with a clock offset
+    if times and poses of a motion were measured. Attachments are left out if the platform hardly turns. Before,
+    mass, CoM and friction are added one by one if they let the balance of forces of the validation samples be
+    predicted better. With `outliers`, slips and outliers are removed first. Raises `InputError` if there are too
+    few measurements even for the offsets.
     """
     sets = [one for one in NESTED if "radii" not in one or robot.pulley_radii.any()]
     turns = turning(robot, measurements)
@@ -138,8 +140,8 @@ def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[st
         # Errors of the poses' velocities let a clock offset seem certain where the lengths hardly change.
         always = frames
     forces = _forces(solved, (*first, *always))
-    if measurements.tensions is not None:
-        sets += [(*one, "stiffness") for one in sets if "offsets" in one]
+    elastic = ["stiffness"] if measurements.tensions is not None else ["elasticity"] * hangs(robot, measurements)
+    sets += [(*one, *elastic) for one in sets if elastic and "offsets" in one]
     best = _compare(solved, [(*one, *always, *forces) if one else one for one in sets], {}).best
     for word in forces if best else ():
         without = tuple(name for name in best if name != word)
@@ -191,7 +193,8 @@ def _compare(solved: Solved, sets: list[tuple[str, ...]], prior: dict[str, float
     wholes = {}
     for clock in {"clock" in one for one in sets} | {False}:
         whole = model_of(of.robot, measurements, ("clock",) if clock else (), {}, of.track)
-        of_forces = {name: getattr(of, name) for name in ("noise", "unbalanced", "ahead", "felt")}
+        of_forces: dict[str, Any] = {name: getattr(of, name) for name in ("noise", "unbalanced", "ahead")}
+        of_forces["felt"] = of.felt or carrying(of, solved.fit.state)
         wholes[clock] = replace(whole, weights=weights, weighs=weighs, **of_forces)
     if len(measurements) > MOST_COMPARED:
         rows = np.linspace(0, len(measurements) - 1, MOST_COMPARED).astype(int)

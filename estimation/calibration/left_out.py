@@ -6,6 +6,7 @@ from ...models.dynamics import dynamics_of
 from ...models.robot import Robot
 from ..logs.load_cells import SAME, slack
 from ..logs.measurements import Measurements, carriers_of, tracked
+from .balance import hangs
 from .differences import PLAUSIBLE
 from .geometry import length_of
 from .parameters import Parameters
@@ -50,15 +51,13 @@ def _still(robot: Robot, measurements: Measurements) -> np.ndarray:
 def _loose(robot: Robot, measurements: Measurements) -> np.ndarray:
     """Return which cables would hardly pull, or push, at measured poses of a platform at rest, (N, m) of bool.
 
-    Unless tensions were measured, the platform hangs from so few cables that its weight determines them. If no reading
-    ever changes, winches are locked and the platform swings.
+    Unless tensions were measured, the platform hangs from so few cables that its weight determines them.
     """
     result, known = np.zeros(measurements.lengths.shape, dtype=bool), tracked(robot, measurements)
     axes = np.flatnonzero(robot.dof_mask)
-    flies = any(carrier.actuators for carrier in robot.carriers)
-    locked = np.array_equal(measurements.lengths[1:], measurements.lengths[:-1])
-    hangs = robot.m <= len(axes) and robot.weight > 0 and not (flies or locked) and measurements.tensions is None
-    if not hangs or measurements.poses is None or not known.any() or np.isnan(measurements.poses[known][:, axes]).any():
+    if not hangs(robot, measurements) or measurements.poses is None or not known.any():
+        return result
+    if np.isnan(measurements.poses[known][:, axes]).any():
         return result
     for rows in np.array_split(np.flatnonzero(known), len(known) // CHUNK + 1):
         poses, carriers = _poses(robot, measurements, rows)

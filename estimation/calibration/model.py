@@ -7,8 +7,9 @@ With the reading y of a cable, its length l at the pose, offset o, build-up b, s
 
 The second is in the units of the reading. The first would shrink with the robot, so a robot of zero size would fit
 best. With known poses the first is a linear regression, which readings that hardly change do not determine. f is 1, or
-1 / (1 + t / (E A)) if tensions were measured, because readings refer to the unstrained cable. These tensions are given
-(`FeltTensions`), up to errors that are further unknowns of the sample, treated as coordinates of its pose.
+1 / (1 + t / (E A)) if tensions are known, measured or by the weight that hangs from the cables, because readings refer
+to the unstrained cable. These tensions are given (`FeltTensions`), up to errors that are further unknowns of the
+sample, treated as coordinates of its pose.
 
 Where forces tell more than lengths, or parameters of theirs are free, the balance of the platform (`balance`) is a
 further residual of each sample. So are measured directions of cables (`sightings`).
@@ -35,7 +36,7 @@ from ..logs.pose_track import PoseTrack
 from .balance import Balance, Balanced, FeltTensions, needs_balance
 from .carrier_motion import CarrierMotion
 from .geometry import runs
-from .parameters import FRAMES, IN_BALANCE, OF_CABLE, OF_ROBOT, Parameters, normal_rows, prior_sigmas
+from .parameters import COMMON, FRAMES, IN_BALANCE, OF_CABLE, OF_ROBOT, Parameters, normal_rows, prior_sigmas
 from .pose_frames import Poses, reframed, twists_of
 from .sightings import Sighted, sightings
 
@@ -236,7 +237,7 @@ class Model(Displayed):
         felt = (self.felt_tensions.tensions + (self.felt_tensions.errors @ state.errors[..., None])[..., 0]).T
         tensions = np.maximum(felt, 0.0)
         by_errors = self.felt_tensions.errors.swapaxes(0, 1) * (felt > 0)[..., None]
-        return 1 / (1 + tensions * self.parameters.table(state.x)[:, 10:11]), tensions, by_errors
+        return 1 / (1 + tensions * self.parameters.compliances(state.x)[:, None]), tensions, by_errors
 
     def begin(self) -> State:
         """Return the parameters of the file, at the initial poses."""
@@ -345,7 +346,7 @@ class Model(Displayed):
         by_strain = -gain * stretch**2 * run.lengths
         cables[..., 10] = by_strain * tensions
         cables[..., 11:] = 0.0
-        by_errors = (by_strain * table[:, 10:11])[..., None] * by_errors
+        by_errors = (by_strain * parameters.compliances(state.x)[:, None])[..., None] * by_errors
         last = np.flatnonzero(parameters.varies[parameters.clock :])
         moved, others = last[last < OF_ROBOT], np.zeros((m, len(position), len(last)))
         if velocity is not None or (moved >= FRAMES.start).any():
@@ -357,6 +358,7 @@ class Model(Displayed):
                 seen.robot[..., moved] += seen.poses @ twists
             if carried is not None:
                 others[..., last == 0] -= np.einsum("mni,mni->mn", by_pose[..., :3], carried[0])[..., None]
+        others[..., last == COMMON] += cables[..., 10:11]
         for column, (cable, first) in enumerate(parameters.slips, start=len(moved)):
             others[cable, first:, column] = -gain[cable, first:]
         forces = self._kept(forces, weighs)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from ...models.robot import Robot
 from ..logs.measurements import Measurements, measured_poses
-from ..logs.smoothing import FEWEST, Parabolas, continuous, within
+from ..logs.smoothing import FEWEST, Parabolas, continuous, widest_parabola, within
 from .parameters import Parameters
 
 SLOWEST = 0.2  # [s] between samples of a motion; if they are farther apart, the platform is taken to be at rest
@@ -64,18 +64,22 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
         return rest
     from scipy.special import erf
 
-    of, local = Parameters(robot, ()), Parabolas(times, within(times))
+    position, rotation, known = measured_poses(robot, measurements)
+    quaternions, width = continuous(Rotation.from_matrix(rotation).as_quat()), within(times)
+    is_known = known[:, robot.dof_mask > 0].all()
+    if is_known and measurements.tensions is None:
+        # Such tensions stretch cables. Noise of the poses, in them and in lengths, would look like stretch.
+        width = max(width, widest_parabola(times, np.hstack([position, quaternions])))
+    of, local = Parameters(robot, ()), Parabolas(times, width)
     lengths = local.fitted(measurements.lengths * of.table(of.first)[:, 7])
     signs = erf(lengths.slopes / np.maximum(np.sqrt(2) * lengths.noise[1], 1e-12))
     rest = rest._replace(signs=signs, smooth=local)
-    position, rotation, known = measured_poses(robot, measurements)
-    if not known[:, robot.dof_mask > 0].all():
+    if not is_known:
         bends = [np.abs(lengths.bends).max(axis=1)]
         if measurements.carrier_poses is not None:  # a load follows its carriers, also on cables of fixed length
             carriers = measurements.carrier_poses[..., :3]
             bends += [np.linalg.norm(local.fitted(one).bends, axis=1) for one in np.swapaxes(carriers, 0, 1)]
         return rest._replace(sigma=np.max(bends, axis=0))
-    quaternions = continuous(Rotation.from_matrix(rotation).as_quat())
     moved, inverse = local.fitted(np.hstack([position, quaternions])), quaternions * [-1, -1, -1, 1]
     rate, spin = (2 * _vector_of_product(part[:, 3:], inverse) for part in (moved.slopes, moved.bends))
     sigma = np.full(count, moved.noise[2, :3].max())

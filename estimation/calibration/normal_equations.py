@@ -53,7 +53,7 @@ def metric(model: Model) -> np.ndarray:
     table[:, 9], table[:, 10] = spread**2, force * length
     table[:, 11:] = length, length / force, length, length / force
     moved = (1.0, 1.0, 1.0, length, length, length) * 2
-    of_robot = (speed, length / model.robot.platform.mass, 1.0, 1.0, 1.0, *moved)
+    of_robot = (speed, length / model.robot.platform.mass, 1.0, 1.0, 1.0, *moved, force * length)
     return np.concatenate([table.ravel(), of_robot, np.ones(len(parameters.slips))])
 
 

@@ -1,11 +1,11 @@
 """Parameters of a calibration: their names, and conversion from and to a robot.
 
-The vector x has fifteen numbers for each cable, in this order, then seventeen of the robot, then one for each slip:
+The vector x has fifteen numbers for each cable, in this order, then eighteen of the robot, then one for each slip:
 
     anchor x y z  attachment x y z  offset  scale  radius  build-up  compliance  capstan  friction  gain  zero
-    clock  mass  com x y z  frame: shift x y z, turn x y z  body: shift x y z, turn x y z
+    clock  mass  com x y z  frame: shift x y z, turn x y z  body: shift x y z, turn x y z  common compliance
 
-Frame and body are the changes of measured poses in `pose_frames`.
+Frame and body are the changes of measured poses in `pose_frames`. The common compliance adds to that of each cable.
 
 With the measured tension y of a cable and the sign s of its speed (1: paid out), the platform feels the tension
 exp(capstan s) gain (y - zero) + friction s, and compliance is 1 / (E A).
@@ -26,14 +26,15 @@ from ...models.parameters import ENCODER
 from ...models.robot import Robot
 
 OF_CABLE = 15  # parameters of a cable
-OF_ROBOT = 17  # clock offset, mass, CoM, and changes of the frames of measured poses
-FRAMES = slice(5, 17)  # of these, the last ones
+OF_ROBOT = 18  # clock offset, mass, CoM, changes of the frames of measured poses, and common compliance
+FRAMES, COMMON = slice(5, 17), 17  # of these, the last ones
 GEOMETRY = ("anchors", "attachments", "offsets", "scales", "radii", "build-up", "clock", "frame", "body")
 IN_BALANCE = ("mass", "com", "capstan", "friction", "gains", "zeros")  # that only the balance of forces determines
-GROUPS = (*GEOMETRY, "stiffness", *IN_BALANCE)
+GROUPS = (*GEOMETRY, "stiffness", "elasticity", *IN_BALANCE)
 COLUMNS = {"anchors": (0, 1, 2), "attachments": (3, 4, 5), "offsets": (6,), "scales": (7,), "radii": (8,)}
 COLUMNS |= {"build-up": (9,), "stiffness": (10,), "capstan": (11,), "friction": (12,), "gains": (13,), "zeros": (14,)}
 ROBOT_COLUMNS = {"clock": (0,), "mass": (1,), "com": (2, 3, 4), "frame": range(5, 11), "body": range(11, 17)}
+ROBOT_COLUMNS |= {"elasticity": (COMMON,)}
 WORDS = (
     *(f"{end}.{axis}" for end in ("anchor", "attachment") for axis in "xyz"),
     *("offset", "scale", "pulley.radius", "build-up", "compliance", "capstan", "friction", "gain", "zero"),
@@ -83,14 +84,14 @@ class Parameters(Displayed):
         """Return the names of all parameters."""
         cables = [f"cables[{i}].{word}" for i in range(self.robot.m) for word in WORDS]
         moved = (f"{of}.{how}.{axis}" for of in ("frame", "body") for how in ("shift", "turn") for axis in "xyz")
-        robot = ("clock", "mass", *(f"com.{axis}" for axis in "xyz"), *moved)
+        robot = ("clock", "mass", *(f"com.{axis}" for axis in "xyz"), *moved, "compliance")
         return (*cables, *robot, *(f"cables[{i}].slip at sample {k}" for i, k in self.slips))
 
     @cached_property
     def units(self) -> tuple[str, ...]:
         """Return the units of all parameters."""
         of_frames = ("m", "m", "m", "rad", "rad", "rad") * 2
-        return (*(UNITS * self.robot.m), "s", "kg", *("m",) * 3, *of_frames, *("m" for _ in self.slips))
+        return (*(UNITS * self.robot.m), "s", "kg", *("m",) * 3, *of_frames, "1/N", *("m" for _ in self.slips))
 
     @cached_property
     def first(self) -> np.ndarray:
@@ -101,7 +102,7 @@ class Parameters(Displayed):
         table[:, list(ENCODED)] = robot.encoders
         table[:, 10] = [1 / cable.stiffness if cable.stiffness else 0.0 for cable in robot.cables]
         table[:, 13] = 1.0
-        of_robot = (0.0, robot.platform.mass, *robot.platform.com, *np.zeros(12))
+        of_robot = (0.0, robot.platform.mass, *robot.platform.com, *np.zeros(13))
         return np.concatenate([table.ravel(), of_robot, np.zeros(len(self.slips))])
 
     @cached_property
@@ -114,6 +115,10 @@ class Parameters(Displayed):
         """Return the parameters of the cables, a row for each, (m, 15)."""
         return x[: self.clock].reshape(self.robot.m, OF_CABLE)
 
+    def compliances(self, x: np.ndarray) -> np.ndarray:
+        """Return 1 / (E A) of the cables, (m,) [1/N]."""
+        return self.table(x)[:, 10] + x[self.clock + COMMON]
+
     def calibrated(self, x: np.ndarray, covariance: np.ndarray | None = None) -> Robot:
         """Return the robot with the values `x`; an encoder is written where offset or scale differ from the file.
 
@@ -121,7 +126,7 @@ class Parameters(Displayed):
         Raises `InputError` if no robot can have these values.
         """
         data = self.robot.model_dump(mode="json")
-        before = self.table(self.first)
+        before, compliances = self.table(self.first), self.compliances(x).tolist()
         for i, row in enumerate(self.table(x).tolist()):
             cable = data["cables"][i]
             cable["anchor"], cable["attachment"] = row[:3], row[3:6]
@@ -132,8 +137,8 @@ class Parameters(Displayed):
                 cable["length"] = row[6] + (row[7] + row[9] * cable["length"]) * cable["length"]
             elif cable["encoder"] is not None or reading != before[i, list(ENCODED)].tolist():
                 cable["encoder"] = dict(zip(ENCODER, reading, strict=True))
-            if row[10] != before[i, 10]:
-                cable["stiffness"] = 1 / row[10] if row[10] > STIFFEST else None
+            if compliances[i] != before[i, 10]:
+                cable["stiffness"] = 1 / compliances[i] if compliances[i] > STIFFEST else None
             if "friction" in self.groups and cable["winch"] is not None:
                 cable["winch"]["friction"] = max(row[12], 0.0)
         mass, *com = x[self.clock + 1 : self.clock + 5].tolist()

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .motion import cross
-from .parameters import FRAMES
+from .parameters import FRAMES, OF_ROBOT
 
 Poses = tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]
 
@@ -36,7 +36,7 @@ def twists_of(
     - `turned`: rotations that follow, (N, 3, 3).
     """
     position, rotation, velocity, rate = poses
-    result = np.zeros((len(position), 6, FRAMES.stop))
+    result = np.zeros((len(position), 6, OF_ROBOT))
     if velocity is not None and rate is not None:
         result[..., 0] = np.concatenate([velocity, rate], axis=1)
     if (columns >= FRAMES.start).any():

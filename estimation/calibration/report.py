@@ -9,6 +9,7 @@ from ...base.text import counted, quantity
 from ...figures.drawing import Drawing
 from ...figures.report import Part, Report, Section, Table
 from ...models.parsing import to_yaml
+from .balance import hangs
 from .file_errors import ENDS
 from .geometry import length_of
 from .left_out import left_out
@@ -21,6 +22,7 @@ MOST_LISTED = 12
 MOST_NAMED = 4
 LACKS = 3.0  # times the stated standard deviation, of residuals that noise alone does not cause
 LOOSE = 0.1  # [m] of standard deviation, which files of robots are usually better than
+UNKNOWN = " (it lacks the stretch of cables, for example, as no tensions were measured)"
 SMALLEST = 1e-6  # [m]: a smaller residual or change of a length means nothing
 
 
@@ -109,6 +111,14 @@ def _of_noise(result: CalibrationData) -> list[str]:
         )
     if result.noise > LACKS * stated and "scales" not in result.free:
         lines.append("the model is incomplete: --free auto also tries scales, attachments and more")
+    stretch = next((one for one in result.parameters if one.name == "compliance"), None)
+    if stretch is not None and 0 < stretch.sigma < stretch.value:
+        lines.append(
+            f"cables stretch: E A is {quantity(1e-3 / stretch.value, 'kN', 3)}, +- "
+            f"{quantity(100 * stretch.sigma / stretch.value, digits=2)} %, if it is the same for all cables"
+            + " and the platform has the file's mass"
+            * (result.measurements.tensions is None)
+        )
     for frame, end in ((one, ENDS[one]) for one in ENDS if one in result.free):
         size = f"wrong by {_mm(result.prior[end])}" if end in result.prior else "exact"
         what = "the frame of the poses" if frame == "frame" else "the measured body"
@@ -134,9 +144,10 @@ def _of_noise(result: CalibrationData) -> list[str]:
             "look like displaced attachments; turn it farther, or leave them out of --free"
         )
     if result.autocorrelation > 1:
+        tense = result.measurements.tensions is not None or hangs(result.file, result.measurements)
         lines.append(
-            "residuals are autocorrelated, because the model is incomplete: the standard deviations "
-            f"below are multiplied by {quantity(result.autocorrelation**0.5, digits=2)}"
+            f"residuals are autocorrelated, because the model is incomplete{'' if tense else UNKNOWN}: "
+            f"the standard deviations below are multiplied by {quantity(result.autocorrelation**0.5, digits=2)}"
         )
     return lines
 

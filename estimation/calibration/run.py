@@ -12,6 +12,7 @@ from .geometry import length_of
 from .parameters import GROUPS, check_free, check_prior
 from .plausibility import mistake
 from .solving import check_enough, solve, usual
+from .stretch import is_elastic, may_stretch, with_elasticity
 from .zeros import has_zeros, with_zeros
 
 
@@ -34,7 +35,8 @@ def calibrate(
         free: Parameters to estimate, any of anchors, attachments, offsets (of the lengths), scales (of the lengths),
             radii (of the pulleys), build-up (of cable on the drums), clock (time by which the clock of the poses is
             ahead of the clock of the lengths), frame and body (errors of the frame that poses were measured in, and of
-            the platform frame in the measured body), com (CoM of the platform), and with tensions mass, stiffness,
+            the platform frame in the measured body), com (CoM of the platform), elasticity (one stiffness for all
+            cables; also estimated if the log of a platform that hangs shows it), and with tensions mass, stiffness,
             capstan (friction as the logarithm of a ratio of tensions), friction (as a force), gains (newtons per unit
             of the tensions, if these are motor currents) and zeros (of load cells; also estimated if the log shows
             some). Default: anchors and offsets, and the clock if times and poses of a motion were measured. Or "auto":
@@ -71,4 +73,9 @@ def calibrate(
     if has_zeros(solved):
         groups, priors = with_zeros(given, groups, priors)
         solved = solve(chosen, given, groups, priors, outliers)
+    if may_stretch(solved):
+        longer, sigmas = with_elasticity(solved)
+        elastic = solve(chosen, given, longer, sigmas, outliers)
+        if is_elastic(elastic):
+            groups, priors, solved = longer, sigmas, elastic
     return Calibration(solved, groups, priors, found)

@@ -12,7 +12,7 @@ from ..logs.cable_directions import placed
 from ..logs.measurements import Measurements, measured, measured_poses, tracked
 from ..logs.pose_track import PoseTrack
 from .autocorrelation import information_of
-from .balance import Balance
+from .balance import Balance, FeltTensions, hangs
 from .carrier_clocks import CarrierClocks, has_carrier_clocks, with_carrier_clocks
 from .carrier_motion import CarrierMotion
 from .clock import CLOCK_RANGE, begin_with_clock, moves_smoothly
@@ -218,17 +218,31 @@ def _stretched(model: Model, state: State, length: float) -> Model:
 
     Noise of tensions would make a cable seem stiffer, so their errors are unknowns if the stiffness is free.
     """
-    compliance, known = model.parameters.table(state.x)[:, 10], model.felt_tensions
+    compliance, known = model.parameters.compliances(state.x), model.felt_tensions
     if known is None or model.forces is None or not compliance.any():
         return model
-    felt = model.forces.felt(model.parameters.table(state.x), model.noise)
+    felt = carrying(model, state) or model.forces.felt(model.parameters.table(state.x), model.noise)
     by_newtons = compliance * length / model.measurements.sigma.lengths
     matters = np.abs(felt.errors * by_newtons[:, None]).max(initial=0.0) > NEGLIGIBLE
-    if "stiffness" not in model.parameters.groups or not matters:
+    if {"stiffness", "elasticity"}.isdisjoint(model.parameters.groups) or not matters:
         felt = felt._replace(errors=felt.errors[..., :0])
     moved = np.sqrt((((felt.tensions - known.tensions) * by_newtons) ** 2).mean(axis=0)).max()
     same = felt.errors.shape == known.errors.shape and moved <= NEGLIGIBLE
     return model if same else replace(model, felt=felt)
+
+
+def carrying(model: Model, state: State) -> FeltTensions | None:
+    """Return the tensions of a platform that `hangs` at a state of the whole log, None for other logs.
+
+    They are smoothed, as noise of the poses, which lengths have as well, would look like stretch.
+    """
+    if model.forces is None or not hangs(model.robot, model.measurements):
+        return None
+    tensions = np.zeros((len(model.measurements), model.robot.m))
+    for rows, part, own in model.parts(state):
+        assert part.forces is not None
+        tensions[rows] = part.forces.carrying(part.parameters, own.x, part.poses(own), part.ahead)
+    return FeltTensions(model.forces.smoothed(tensions), np.zeros((*tensions.shape, 0)))
 
 
 def model_of(
@@ -257,7 +271,9 @@ def model_of(
         lengths = table[:, 6] + table[:, 7] * measurements.lengths
         start = level_poses(robot, lengths, "offsets" in groups, measurements.carrier_poses)
         model = replace(model, start=placed(robot, measurements, start))
-    return model
+    elastic = "elasticity" in groups or parameters.compliances(parameters.first).any()
+    felt = carrying(model, model.begin()) if elastic else None
+    return model if felt is None else replace(model, felt=felt)
 
 
 def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ...], prior: dict[str, float]) -> None:
@@ -279,8 +295,9 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
     framed = [name for name in ("frame", "body") if name in groups]
     if framed and not measured(measurements).any():
         raise InputError(f"measurements.poses must be given to estimate {', '.join(framed)}, got none")
-    of_forces = [name for name in groups if name in (*IN_BALANCE, "stiffness")]
-    if measurements.tensions is None and of_forces not in ([], ["com"]):
+    of_forces = [name for name in groups if name in (*IN_BALANCE, "stiffness", "elasticity")]
+    known = ["elasticity"] * hangs(robot, measurements) + ["com"]
+    if measurements.tensions is None and not set(of_forces) <= set(known):
         flies = any(carrier.actuators for carrier in robot.carriers)
         hint = " (or thrusts, attitudes and times of the carriers in a log)" if flies else ""
         raise InputError(f"measurements.tensions must be given to estimate {', '.join(of_forces)}{hint}, got none")
