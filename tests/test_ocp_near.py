@@ -145,6 +145,27 @@ def test_a_solution_that_stopped_improving_is_continued_with_its_multipliers(mon
     assert again.iterations < expected.iterations
 
 
+def test_where_a_program_goes_in_a_circle_distances_are_linear_about_the_motion_before(monkeypatch):
+    """Within millimetres of a corner a step of Newton's method leads from one side to the other and back."""
+    scenario, mesh = scenario_of(TASK | {"steps": 20}), Mesh(20)
+    looking, fresh = (search.Search(scenario, {}, None) for _ in range(2))
+    expected = fresh.solve("fresh", mesh, None)
+    with monkeypatch.context() as patched:
+        for name, value in {"ROUND": 1, "GAIN": 10.0, "CLOSE": np.inf}.items():
+            patched.setattr(solver, name, value)  # the first iterate that is not twice as near is a circle
+        outcome = looking.solve("first", mesh, None)
+    assert [stage.message.split(" after")[0] for stage in looking.stages] == ["went in a circle", "solved"]
+    assert outcome.success
+    assert outcome.objective == pytest.approx(expected.objective, rel=1e-2)
+    motion = scenario.motion(outcome.deviation.nodes, outcome.deviation)
+    for limit, values in zip(scenario.limits, scenario.limits.along(*motion), strict=True):
+        if limit.unit == "m":
+            assert values.min() >= limit.low - search.APPROACHED * limit.scale
+    again = looking.solve("again", mesh, outcome.deviation)
+    assert again.success
+    assert len(looking.stages) == 3  # linear at once
+
+
 def test_another_pair_of_one_limit_is_tightened_beyond_what_all_pairs_have():
     """One share applies to all pairs of quadrotors: less for a second pair changed nothing, and meshes got finer."""
     task = {

@@ -42,7 +42,7 @@ class LinearDistances:
         first = Block(linear, rows, np.zeros(1, int), slopes=slopes)
         problem = program.problem | {"g": ca.vertcat(linear, program.problem["g"][self._count :]), "p": p}
         self._sparsity = slopes.sparsity()
-        self._solver = Solver(replace(program, problem=problem, blocks=[first, *others]), MOST_ITERATIONS)
+        self._solver = Solver(replace(program, problem=problem, blocks=[first, *others], local=0), MOST_ITERATIONS)
 
     def solve(self, motion: Deviation, progress: Progress | None, seconds: float) -> Outcome:
         """Solve with distances about a motion at the program's points."""

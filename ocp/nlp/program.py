@@ -38,9 +38,9 @@ from .grid import Grid, passed
 from .held import eased, held_wrench
 from .interval import points
 from .layout import DURATION, MARGIN, Layout
-from .near import Near, parts
+from .near import Near, has_places, parts
 from .part import Part
-from .rows import Mesh, Row, Tightening, stretch
+from .rows import MANY, Mesh, Row, Tightening, stretch
 from .stages import Stages, reference_motions
 
 LEGS = 0.3, 3.0  # times its duration in the motion before: what one of a leg may be
@@ -82,6 +82,11 @@ class Program(Displayed):
         lower, upper = _simple_bounds(scenario, mesh, self.layout, self.shares * scenario.duration)
         lower_g, upper_g = _bounds(scenario, mesh, Grid.of(scenario, mesh.steps), self.blocks)
         return replace(self, mesh=mesh, lower=lower, upper=upper, lower_g=lower_g, upper_g=upper_g)
+
+    @cached_property
+    def has_corners(self) -> bool:
+        """Return whether a robot keeps true distances from regions; teams come nearer slowly for long, and arrive."""
+        return self.local > 0 and has_places(self.scenario) and self.scenario.count <= MANY
 
     def columns(self, x: np.ndarray) -> np.ndarray:
         """Return the unknowns of each point, one row per point."""

@@ -26,6 +26,8 @@ from .waiting import Errands, wait_for
 MET = 1e-8  # what constraints of a program may miss, in its units
 BETTER = 1e-3  # of the objective: what a solution must be better by for the search to go on
 PATIENCE = 10  # iterations without a better one
+ROUND, CLOSE = 24, 1e-4  # iterates in a circle, and what constraints miss there at most
+GAIN = 1e-4  # of the objective: what an iterate must be better by not to be in a circle
 MOST_ITERATIONS = 400
 # Of the pivot tolerances of MUMPS the larger one refactorises less where thrust directions are equations: teams of
 # quadrotors then take half of the time. Of other robots each iteration takes 10 % longer. Ordered by METIS, an
@@ -37,6 +39,7 @@ TEAM = {"mumps_pivtol": 1e-4, "mumps_pivot_order": 5}
 # IPOPT's default, 1e-8, with which each step is far from Newton's. A minimum time took 300 iterations; it takes 36.
 NEARLY_SINGULAR = {"jacobian_regularization_value": 1e-13}
 TIME_LIMIT, SETTLED = "time limit", f"no better by {BETTER:.1%} in {PATIENCE} iterations"  # messages of ours
+CIRCLING = f"{ROUND} iterates that are neither better nor nearer"  # likewise
 Progress = Callable[[int, float, float], None]  # iteration, objective, infeasibility
 VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
 
@@ -189,6 +192,8 @@ class Solver:
             message = TIME_LIMIT if watch.late else SETTLED
             if watch.best:
                 x, objective, met, last = watch.best["x"], watch.objective, True, watch.best
+        elif watch.circling:
+            (x, objective), message = watch.nearest, CIRCLING
         self._last = last if statistics["success"] or (met and watch.settled) else None
         return self._outcome(x, objective, bool(statistics["success"]) or met, str(message), iterations)
 
@@ -229,7 +234,8 @@ class _Watch(ca.Callback):
 
     That is when its run is abandoned, when the time is up, or when the search has settled: a minimum time is often
     reached long before IPOPT is sure that there is no shorter one, and where much costs nothing it moves on and on
-    between solutions that are as good as each other.
+    between solutions that are as good as each other. Or when it goes in a circle: distances bend within centimetres of
+    a corner, or have corners themselves, where a step of Newton's method leads from one side to the other and back.
     """
 
     def __init__(self, program: Program):
@@ -250,6 +256,9 @@ class _Watch(ca.Callback):
         self.objective = np.inf  # its
         self._mark = np.inf  # the objective that a later one has to be better than
         self._since = 0  # the last iteration that was on the way to a better one
+        self.nearest = np.zeros(0), np.inf  # unknowns and objective of the iterate that misses the constraints by least
+        self._missed, self._least = np.inf, np.inf  # by how much it does; and the least objective close to them
+        self._round = 0  # close ones since one of them came nearer, or had a better objective
         self.abandoned = False  # whether nobody waits for the run any more
 
     def follow(self, nlp: ca.Function, start: dict[str, Any]) -> dict[str, ca.DM]:
@@ -260,6 +269,11 @@ class _Watch(ca.Callback):
     def settled(self) -> bool:
         """Return whether `best` no longer improves."""
         return bool(self.best) and self.iteration - self._since > PATIENCE
+
+    @property
+    def circling(self) -> bool:
+        """Return whether the iterates near the constraints are no longer better nor nearer, because of distances."""
+        return self.program.has_corners and not self.best and self._round >= ROUND
 
     def get_n_in(self) -> int:
         return ca.nlpsol_n_out()
@@ -290,14 +304,31 @@ class _Watch(ca.Callback):
         if infeasibility <= MET:
             self._keep({"x": x, "g": g, "lam_x": lam_x, "lam_g": lam_g}, objective)
         # A product of such long vectors by `@` would start a thread of BLAS, which then waits at full load.
-        if objective + (lam_g * missed).sum() < self._better():
+        made_up = objective + (lam_g * missed).sum()
+        if made_up < self._better():
             self._since = self.iteration
+        self._follow(x, objective, made_up, infeasibility)
         if self._progress is not None:
             self.errands.put(partial(self._progress, self.iteration, objective, infeasibility))
         self.iteration += 1
         self.late = time.perf_counter() > self._deadline
-        np.frombuffer(res[0])[:] = self.abandoned or self.settled or self.late
+        np.frombuffer(res[0])[:] = self.abandoned or self.settled or self.circling or self.late
         return 0
+
+    def _follow(self, x: np.ndarray, objective: float, made_up: float, infeasibility: float) -> None:
+        """Note whether an iterate is better or nearer than all before it that are close to the constraints.
+
+        `made_up` is the objective with what making up for the infeasibility would change.
+        """
+        if infeasibility > CLOSE:
+            return
+        self._round += 1
+        if not np.isfinite(self._least) or made_up < self._least - GAIN * abs(self._least):
+            self._round, self._least = 0, made_up
+        if infeasibility < self._missed / 2:
+            self._round = 0
+        if infeasibility < self._missed:
+            self.nearest, self._missed = (x.copy(), objective), infeasibility
 
     def _better(self) -> float:
         """Return the objective below which it is worth going on."""

@@ -5,7 +5,7 @@ import numpy as np
 from ..nlp.guess import balanced
 from ..nlp.near import has_places, jumps
 from ..nlp.rows import MANY, Mesh
-from ..nlp.solver import Outcome
+from ..nlp.solver import CIRCLING, Outcome
 from ..tasks.deviation import Deviation
 from .search import Search
 
@@ -22,12 +22,14 @@ def from_easier(search: Search, mesh: Mesh, start: Deviation | None, guessed: bo
         return search.solve("nonlinear program", mesh, start)
     coarse = _coarse(search) if guessed else None
     near = _slowly(search, coarse or mesh, start) if guessed else None
-    near = search.approach(coarse or mesh, near or start) or near
+    linear = search.approach(coarse or mesh, near or start)
+    near = near if linear is None else linear.deviation
     optimal = False
     if coarse is not None:
         outcome = search.solve("coarse program", coarse, near or start, clear=near is not None)
         # Through a region between its nodes it is on no side of it: finer programs would end far from where they begin.
-        optimal = outcome.success and not jumps(search.scenario, outcome.deviation)
+        ends = outcome.success or outcome.message == CIRCLING
+        optimal = ends and not jumps(search.scenario, outcome.deviation)
         near = outcome.deviation if optimal else near
     # Linear distances leave a motion at their bounds. From a small barrier the program would creep along them.
     outcome = search.solve("nonlinear program", mesh, near or start, coarser=optimal, clear=near is not None)
@@ -49,8 +51,10 @@ def _slowly(search: Search, mesh: Mesh, start: Deviation | None) -> Deviation | 
         # Nodes as few as those of the mesh: what is sharp between them would tilt carriers as no limit lets them.
         nodes = np.linspace(0.0, slow.duration, mesh.steps + 1)
         start = balanced(slow, start.stretched(slow.duration / start.nodes[-1]).at(nodes))
-    motion = search.approach(mesh, start, slow)
-    return motion.stretched(scenario.duration / slow.duration) if motion is not None and span is None else motion
+    linear = search.approach(mesh, start, slow)
+    if linear is None:
+        return None
+    return linear.deviation.stretched(scenario.duration / slow.duration) if span is None else linear.deviation
 
 
 def _coarse(search: Search) -> Mesh | None:

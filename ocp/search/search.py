@@ -19,7 +19,7 @@ from ..nlp.linear import LinearDistances
 from ..nlp.near import Near, has_places
 from ..nlp.program import Program, build
 from ..nlp.rows import Mesh
-from ..nlp.solver import MOST_ITERATIONS, SETTLED, TIME_LIMIT, Outcome, Progress, Solver
+from ..nlp.solver import CIRCLING, MOST_ITERATIONS, SETTLED, TIME_LIMIT, Outcome, Progress, Solver
 from ..nlp.stages import Stages
 from ..nlp.waiting import raise_if_swallowed, wait_for
 from ..plan import Plan
@@ -46,6 +46,7 @@ ENDS = {  # of a run of the solver, by its message; others are quoted
     "Maximum_Iterations_Exceeded": "iteration limit reached",
     TIME_LIMIT: "time limit reached",
     SETTLED: "stopped improving",
+    CIRCLING: "went in a circle",
 }
 
 
@@ -77,6 +78,7 @@ class Search:
         self._iterates: list[tuple[int, float, float]] = []
         self._audited: list[tuple[float, Outcome, Audit]] = []
         self._interrupted: Outcome | None = None
+        self._circled = 0  # steps of the program that went in a circle last
         self.effort = 0.0  # of all runs of solvers: iterations times free coordinates at all nodes
         self.offers_effort, self.cut_short = 0.0, False  # of the search for offers, and whether it had to stop
 
@@ -131,8 +133,21 @@ class Search:
         """Solve the program of `mesh` from `guess`; default: from its last solution, or else from a guess of its own.
 
         A guess is `coarser` if it is the same task's optimum on a coarser mesh, and `clear` if it is past all regions
-        that are in the way, as such an optimum is.
+        that are in the way, as such an optimum is. If the program goes in a circle, the distances are linear instead:
+        at once where it did so before with as many steps.
         """
+        again = mesh.steps == self._circled and not mesh.elastic and guess is not None
+        if again and (found := self.approach(mesh, guess)) is not None:
+            self.mesh = mesh
+            return found
+        outcome = self._solve(name, mesh, guess, coarser, clear)
+        if outcome.message != CIRCLING or mesh.steps < self.scenario.task.steps or mesh.elastic:
+            return outcome
+        self._circled = mesh.steps
+        return self.approach(mesh, outcome.deviation) or outcome
+
+    def _solve(self, name: str, mesh: Mesh, guess: Deviation | None, coarser: bool, clear: bool) -> Outcome:
+        """Solve the program of `mesh`, with rows of further regions where the solution may exceed them."""
         with self.stage(f"{name}, {mesh.steps} steps") as stage:
             if self.seconds_left <= 0:
                 stage.message = f"{ENDS[TIME_LIMIT]} before it began"
@@ -182,7 +197,7 @@ class Search:
             stage.message = f"{ended(outcome.message)} in {counted(outcome.iterations, 'iteration')}"
         return outcome
 
-    def approach(self, mesh: Mesh, guess: Deviation | None, scenario: Scenario | None = None) -> Deviation | None:
+    def approach(self, mesh: Mesh, guess: Deviation | None, scenario: Scenario | None = None) -> Outcome | None:
         """Return a motion past the regions that are in the way, from which the program of `mesh` soon ends, or None.
 
         It results from passes with linear distances, each about the motion of the one before. The motion is one of
@@ -198,7 +213,7 @@ class Search:
             motion = initial_guess(scenario, shares * scenario.duration) if guess is None else guess
             motion = motion.at(shares * motion.nodes[-1])
             near, linear = Near.along(scenario, shares, motion, 2 * NEAR), None
-            objective, iterations, missed = np.inf, 0, np.inf
+            best, objective, iterations, missed = None, np.inf, 0, np.inf
             for passed in range(PASSES + ROUNDS):
                 if linear is None:
                     linear = wait_for(lambda near=near: LinearDistances(self._build(scenario, mesh, near)))
@@ -217,12 +232,12 @@ class Search:
                     near = near.widened(scenario, shares, outcome.deviation, NEAR)
                     linear, missed = None, np.inf
                     continue
-                motion, missed = outcome.deviation, linear.missed(outcome.deviation)
+                best, motion, missed = outcome, outcome.deviation, linear.missed(outcome.deviation)
                 settled = missed <= APPROACHED and outcome.objective > objective - GAIN * abs(objective)
                 if settled or passed + 1 >= PASSES:
                     break
                 objective = outcome.objective
-        return motion if missed <= USABLE else None
+        return best if missed <= USABLE else None
 
     def _unsolved(self, mesh: Mesh, guess: Deviation | None) -> Outcome:
         """Return the motion from which the program of `mesh` would start, as the outcome of no iteration."""
