@@ -5,10 +5,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..estimation.calibration.geometry import length_of
 from .replayed_robot import Parameters
 from .windows import Windows
 
-# Of each parameter: its smallest and largest value, and the step of its derivative; those of the CoM over the length.
+# Of each parameter: its smallest and largest value, and the step of its derivative; those of the CoM over the length of
+# the platform, those of anchors over that of the cables.
 RANGES = {
     "delay": (-0.2, 0.2, 1e-3),
     "friction": (0.0, 1e5, 0.1),
@@ -16,6 +18,7 @@ RANGES = {
     "stiffness": (0.1, 10.0, 0.02),
     "tilt": (-0.5, 0.5, 2e-3),
     "com": (-1.0, 1.0, 2e-3),
+    "anchors": (-0.3, 0.3, 2e-4),
     "load_cells": (-0.9, 10.0, 0.01),
     "cable_friction": (-1e5, 1e5, 0.1),
 }
@@ -27,6 +30,7 @@ NOTHING = 0.5  # of the sum of squares that noise has: less needs no explanation
 DOUBT = 5e-4  # probability, on each side, that a parameter is named which only the scatter of the windows changes
 TIED = 0.1  # of what the best explains: others that explain as much, up to this, are not distinguished from it
 SHOWN = 0.1  # of a parameter (of 0.1 s, a third of the length, a tenth of the tensions): its deviation if not shown
+LARGE = 0.3  # of the cables' length: displacements of anchors in which a tenth of it is plausible
 BLURRED = 0.2  # of the squares of the derivative by the stiffness: what may be noise of lengths
 FARTHEST = 5.0  # standard deviations of a start
 OUTLYING = 25.0  # times the usual sum of squares of a window
@@ -125,8 +129,14 @@ class Matching:
     def _range(self, name: str) -> tuple[float, float, float]:
         """Return the smallest and the largest value of a parameter, and the step of its derivative."""
         low, high, step = RANGES[name]
-        scale = self.windows.robot.length if name == "com" else 1.0
+        scale = {"com": self.windows.robot.length, "anchors": length_of(self.windows.robot)}.get(name, 1.0)
         return scale * low, scale * high, scale * step
+
+    def _size(self, name: str) -> float:
+        """Return the size of a parameter, of which a standard deviation that shows it is a small share."""
+        robot, usual = self.windows.robot, self.windows.usual_tension
+        sizes = {"delay": 0.1, "com": robot.length, "anchors": LARGE * length_of(robot), "cable_friction": usual}
+        return sizes.get(name, 1.0)
 
     def slope(self, first: Match, name: str) -> np.ndarray:
         """Return the derivatives of the residuals of a match by a parameter of k numbers, (k, W, R + P)."""
@@ -141,8 +151,7 @@ class Matching:
     def fitted(self, first: Match, name: str, used: np.ndarray) -> tuple[Match, np.ndarray]:
         """Fit one parameter alone to windows `used`, (W,) of bool; return the match, and standard deviations (k,)."""
         (low, high, _), best, size = self._range(name), first, np.size(getattr(first.parameters, name))
-        usual = {"cable_friction": self.windows.usual_tension, "com": self.windows.robot.length}.get(name, 1.0)
-        sigma, least = np.full(size, np.inf), 0.0 if size == 1 else 1 / (SHOWN * usual) ** 2
+        sigma, least = np.full(size, np.inf), 0.0 if size == 1 else 1 / (SHOWN * self._size(name)) ** 2
         for _ in range(STEPS):
             slope, value = self.slope(best, name)[:, used], np.atleast_1d(getattr(best.parameters, name))
             steep = np.einsum("iwr,jwr->wij", slope, slope)
@@ -176,13 +185,13 @@ class Matching:
 
         found, whole, count = [], first.cost[used].sum(), float(np.count_nonzero(first.left[used]))
         certain = float(stdtrit(max(int(used.sum()) - 1, 1), 1 - DOUBT))  # quantile of Student's t
-        usual, length = self.windows.usual_tension, self.windows.robot.length
         for name in applicable(self.windows):
             match, sigma = self.fitted(first, name, used)
             before, value = (np.atleast_1d(getattr(one.parameters, name)) for one in (first, match))
             removed = whole - match.cost[used].sum()
-            sizes = {"delay": 0.1, "com": length / 3, "cable_friction": usual}
-            size = max(10 * value[0], 0.1 * usual) if name == "friction" else sizes.get(name, 1.0)
+            size = self._size(name) / (3 if name == "com" else 1)
+            if name == "friction":
+                size = max(10 * value[0], 0.1 * self.windows.usual_tension)
             certainly = np.abs(value - before) > certain * sigma
             low, high, _ = self._range(name)
             inside = bool(((low < value + (name == "friction")) & (value < high)).all())
@@ -205,13 +214,17 @@ def applicable(windows: Windows) -> Sequence[str]:
     felt = windows.drive != "lengths" or (recorded.tensions is not None and recorded.robot.fixed_lengths is None)
     names = {"delay": windows.commanded, "friction": felt, "mass": True, "stiffness": windows.drive != "tensions"}
     names |= {"tilt": True, "com": bool(recorded.robot.dof_mask[3:].any()), "load_cells": recorded.tensions is not None}
-    names["cable_friction"] = felt
+    names |= {"cable_friction": felt, "anchors": recorded.robot.fixed_lengths is None}
     return [name for name, depends in names.items() if depends]
 
 
 def weight(one: Explanation) -> float:
-    """Return the share of an explanation, reduced if it has several numbers, because these explain more anyway."""
-    return one.explained * (1 - TIED * min(np.size(one.value) - 1, 2) / 2)
+    """Return the share of an explanation, reduced if it has several numbers, because these explain more anyway.
+
+    Displaced anchors explain nearly as much as whatever else is wrong.
+    """
+    several = min(np.size(one.value) - 1, 2) / 2 + (one.name == "anchors")
+    return one.explained * (1 - TIED * several)
 
 
 def _with(parameters: Parameters, name: str, value: np.ndarray) -> Parameters:

@@ -218,7 +218,7 @@ class Replay(Drawn, Reported, Displayed):
             return f"{text}; {self.windows.recorded.doubt}"
         if self.named:
             best = self.found[0]
-            verb = "explain" if best.name == "load_cells" else "explains"
+            verb = "explain" if best.name in ("load_cells", "anchors") else "explains"
             text += f"; {' or '.join(map(_words, self.named))} {verb} {_share(best)} of the residuals: "
             text += _value(best.name, best.value)
             after = self._rms(self.explained or {})
@@ -362,6 +362,9 @@ def _value(name: str, value: Any) -> str:
         return quantity(float(np.degrees(np.linalg.norm(value))), "deg", 3)
     if name == "com":
         return f"({quantity_row(np.multiply(value, 1e3), digits=3)}) mm from the file's"
+    if name == "anchors":
+        largest = np.linalg.norm(np.reshape(value, (-1, 3)), axis=1)
+        return f"up to {quantity(1e3 * largest.max(), 'mm', 3)} from the file's, of cables[{largest.argmax()}]"
     if name == "cable_friction":
         largest = int(np.argmax(np.abs(value)))
         return f"up to {quantity(value[largest], 'N', 3)}, of cables[{largest}]"

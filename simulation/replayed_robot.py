@@ -12,7 +12,7 @@ STRAIN = 1e-3  # at t_max, of cables whose stiffness is not known
 
 
 class Parameters(NamedTuple):
-    """Parameters that a model may have wrong, besides its geometry."""
+    """Parameters that a model may have wrong."""
 
     delay: float = 0.0  # time by which the robot is later than its recorded commands [s]
     friction: float = 0.0  # dry friction of the winches, as a force on each cable, the mean over the cables [N]
@@ -24,6 +24,7 @@ class Parameters(NamedTuple):
     # of load cells, (2 m,): gains minus 1, and readings without tension over the usual tension
     load_cells: tuple[float, ...] = ()
     cable_friction: tuple[float, ...] = ()  # dry friction of each cable beyond `friction`, (m,) [N]
+    anchors: tuple[float, ...] = ()  # anchors less the file's, (3 m,) [m]
 
 
 def modelled(robot: Robot, drive: str, flown: np.ndarray) -> Robot:
@@ -52,10 +53,12 @@ def friction_of(robot: Robot) -> float:
 
 
 def changed(robot: Robot, to: Parameters) -> Robot:
-    """Return a robot with other parameters; its geometry and cables without stiffness or winch stay."""
+    """Return a robot with other parameters; attachments and cables without stiffness or winch stay."""
     more, cables = to.friction - friction_of(robot), []
-    for cable, own in zip(robot.cables, to.cable_friction or robot.m * (0.0,), strict=True):
+    moved = np.reshape(to.anchors or 3 * robot.m * (0.0,), (-1, 3))
+    for cable, own, by in zip(robot.cables, to.cable_friction or robot.m * (0.0,), moved, strict=True):
         changes: dict[str, Any] = {"stiffness": cable.stiffness and cable.stiffness * to.stiffness}
+        changes["anchor"] = tuple(np.add(cable.anchor, by).tolist())
         if cable.winch is not None:
             winch = cable.winch.model_copy(update={"friction": max(cable.winch.friction + more + own, 0.0)})
             changes["winch"] = winch

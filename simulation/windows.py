@@ -61,8 +61,9 @@ class Windows:
             self.notes.append("cables without a stiffness in the file are given one: 0.1 % of elongation at t_max")
         if self.drive == "lengths" and recorded.tensions is None and robot.fixed_lengths is None:
             self.notes.append("lengths do not show friction of the winches: record tensions or motor currents for that")
-        m = robot.m  # parameters of the file
-        self.usual = Parameters(friction=friction_of(self.robot), load_cells=2 * m * (0.0,), cable_friction=m * (0.0,))
+        none = robot.m * (0.0,)  # parameters of the file
+        usual = {"load_cells": 2 * none, "cable_friction": none, "anchors": 3 * none}
+        self.usual = Parameters(friction=friction_of(self.robot), **usual)
         self.usual_tension = self.robot.force_scale
         if recorded.tensions is not None:
             self.usual_tension = float(np.median(np.abs(recorded.tensions)))

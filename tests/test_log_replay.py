@@ -228,6 +228,17 @@ def test_what_is_wrong_is_named_first(kind, name, robot, options, truth, logs):
     assert f"{name} explains" in result.report().splitlines()[0]
 
 
+def test_wrong_anchors_are_named(logs):
+    moved = np.array([[0.0, 0, 0.03], [0, 0, 0], [-0.03, 0, 0], [0, 0, 0]])
+    cables = [
+        cable.model_copy(update={"anchor": tuple(np.add(cable.anchor, by).tolist())})
+        for cable, by in zip(PLANAR.cables, moved, strict=True)
+    ]
+    result = replay(PLANAR.model_copy(update={"cables": tuple(cables)}), logs["lengths"])
+    assert result.named == ["anchors"]
+    assert "anchors explain" in result.report().splitlines()[0]
+
+
 @pytest.mark.parametrize(("gain", "zero", "drive"), [(1.2, 0.0, None), (1.0, 10.0, None), (1.2, 0.0, "tensions")])
 def test_a_wrong_load_cell_is_neither_mass_nor_stiffness(gain, zero, drive, tmp_path):
     """It is found if readings are compared with the simulation, and if they are its commands."""
