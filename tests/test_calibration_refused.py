@@ -219,3 +219,19 @@ def test_save_names_its_argument():
     built = as_built(60, 0)
     with pytest.raises(InputError, match="path must be a path, got 3"):
         calibrate("cogiro", built.measurements()).save(path=3)
+
+
+@pytest.mark.parametrize(("share", "refused"), [(0.2, False), (0.4, True)])
+def test_a_fit_that_leaves_out_much_is_refused(share, refused):
+    """Offsets of 0.1 m, with readings of which many are off by 30 to 100 mm."""
+    robot, draw = load("planar-4"), np.random.default_rng(0)
+    poses, moves = np.tile(robot.home, (150, 1)), np.flatnonzero(robot.dof_mask)
+    poses[:, moves] += draw.uniform(-0.3, 0.3, (150, len(moves))) * np.where(moves < 3, 1, 0.3)
+    lengths = Dynamics(robot).cable_lengths(poses) + draw.normal(0.1, 1e-3, (150, 4))
+    wrong = draw.uniform(0.03, 0.1, lengths.shape) * draw.choice([-1, 1], lengths.shape)
+    lengths += np.where(draw.random(lengths.shape) < share, wrong, 0)
+    said = calibrate(robot, Measurements(lengths, poses), ["offsets"]).refused
+    if refused:
+        assert "% of the readings do not fit the others" in said
+    else:
+        assert said is None

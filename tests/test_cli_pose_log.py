@@ -36,13 +36,13 @@ def readings(robot, times, seed=0):
 
 def write(path, times, table):
     header = ",".join(["time [s]", *(f"winch_{i + 1}_position [m]" for i in range(8))])
-    np.savetxt(path, np.column_stack([times, table]), "%.12g", ",", header=header, comments="")
+    np.savetxt(path, np.column_stack([times, table]), "%.16g", ",", header=header, comments="")
     return path
 
 
 def test_poses_of_a_log(robot, tmp_path):
-    times = 5 + np.arange(0, 30, 0.01)
-    table = readings(robot, times - 5)
+    times = 1.7e9 + np.arange(0, 30, 0.01)  # counted from 1970
+    table = readings(robot, times - 1.7e9)
     table[700, 3] += 0.02 / 0.053  # 20 mm
     table[1200:1210, 6] -= 0.03 / 0.056
     write(tmp_path / "log.csv", times, table)
@@ -56,8 +56,8 @@ def test_poses_of_a_log(robot, tmp_path):
     names = (tmp_path / "log-poses.csv").read_text().splitlines()[0].split(",")
     assert names[:7] == ["t [s]", *(f"{name} [m]" for name in "xyz"), "roll [rad]", "pitch [rad]", "yaw [rad]"]
     rows = np.loadtxt(tmp_path / "log-poses.csv", delimiter=",", skiprows=1)
-    np.testing.assert_allclose(rows[:, 0], times)
-    expected = motion(load(robot), times - 5)
+    np.testing.assert_allclose(rows[:, 0] - times, 0, atol=1e-6)
+    expected = motion(load(robot), times - 1.7e9)
     sound = rows[:, names.index("fits [1]")] > 0
     assert (~sound).sum() == 11
     # The errors of position and rotation have the covariance that is written: chi-square with six degrees of freedom.

@@ -60,6 +60,13 @@ def test_locked_winches_have_no_clock(tmp_path):
         assert abs(value) < 4 * sigma + 1e-4
     said = towline("pose", robot, "--log", "locked.csv", cwd=tmp_path).stdout
     assert "lengths do not determine the pose: poses are those at rest" in said
+    # Constant lengths show another frame, too.
+    given, turn = read_measurements(tmp_path / "locked.csv", robot=robot), Rotation.from_euler("z", 40, degrees=True)
+    turned = (turn * Rotation.from_euler("xyz", given.poses[:, 3:])).as_euler("xyz")
+    moved = turn.apply(given.poses[:, :3]) + np.array([1, 0.4, -0.2])
+    wrong = mistake(load(robot), given.changed(poses=np.hstack([moved, turned])))
+    assert "measured in a frame that is turned by" in wrong.text
+    np.testing.assert_allclose(wrong.corrected.poses[:, :3], given.poses[:, :3], atol=0.05)
 
 
 def test_locked_winches_and_poses_in_two_files(tmp_path):
@@ -230,6 +237,26 @@ def test_offsets_turn_a_small_platform_as_another_heading_does(heading, tmp_path
         Rotation.from_euler("xyz", found.corrected.poses[:, 3:]) * Rotation.from_euler("xyz", given.poses[:, 3:]).inv()
     )
     assert np.degrees(error.magnitude()).max() < 1.0
+
+
+def test_offsets_hide_how_an_ahrs_is_mounted(tmp_path):
+    """Offsets of 0.1 m turn a facade robot by 10 degrees, as far as it turns itself; a fit finds the mounting."""
+    draw = np.random.default_rng(4)
+    corners = np.array([[7.0, 5], [-7, 5], [-7, -5], [7, -5]])
+    ends = np.array([[*(xy * by), z] for xy in corners for by, z in ((1, 0.3), (1, 6), (0.09, 0.3), (0.09, -0.3))])
+    ends = ends.reshape(4, 2, 2, 3)  # corner, anchors or attachments, low or high
+    anchors, attachments = ends[:, 0].reshape(8, 3), ends[:, 1].reshape(8, 3)
+    robot = load(user.robot_file(tmp_path / "facade.yaml", anchors, attachments, (0, 0, 2.8, 0, 0, 0), mass=60.0))
+    places, turns = draw.uniform([-4, -2.5, 1.5], [4, 2.5, 4.2], (25, 3)), draw.normal(0, 0.12, (25, 3))
+    lengths = user.lengths_at(anchors, attachments, places, user.turned(turns)) - draw.uniform(-0.1, 0.1, 8)
+    mounted = Rotation.from_euler("xyz", [0, 15, 90], degrees=True)
+    seen = Rotation.from_rotvec(draw.normal(0, 0.009, (25, 3))) * Rotation.from_rotvec(turns) * mounted
+    poses = np.hstack([np.full((25, 3), np.nan), seen.as_euler("xyz")])
+    given = Measurements(lengths, poses, sigma={"lengths": 1e-3, "rotation": 0.009})
+    found = mistake(robot, given)
+    assert "the sensor of the orientations looks turned by" in found.text
+    left = Rotation.from_euler("xyz", found.corrected.poses[:, 3:]) * Rotation.from_rotvec(turns).inv()
+    assert np.degrees(left.mean().magnitude()) < 1.0
 
 
 def test_without_a_fit_only_clear_differences_of_orientations_are_errors(tmp_path, monkeypatch):

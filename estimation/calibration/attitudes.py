@@ -34,10 +34,10 @@ ENOUGH = 1e-3  # of the sum of squares, of a step that these fits need not take
 
 
 class Misread(NamedTuple):
-    """An error of the measured orientations, in one line, and the measurements without it."""
+    """An error of the measured orientations, in one line, and the measurements without it, None if much is left."""
 
     text: str
-    corrected: Measurements
+    corrected: Measurements | None
 
 
 def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
@@ -73,14 +73,14 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
         for left, right, frame in ((none, none, ""), (world, none, "world"), (none, inner, "sensor")):
             size = float(np.median((left * seen * right * expected.inv()).magnitude()))
             corrections = (k > 0) + bool(frame)
-            if (k > 0 or frame == "sensor") and size > EXPLAINED * spread:  # a constant orientation differs as little
+            if k > 0 and size > EXPLAINED * spread:  # a constant orientation differs as little
                 continue
             tried.append((size * CLEARLY**corrections, size, frame, left, right, k))
-    as_they_are, other_heading = tried[:2]
+    as_they_are, *of_frames = tried[:3]
     if as_they_are[1] < VISIBLE:
         return None
     ranked = sorted(tried, key=lambda one: one[0])
-    likely = [one for one in ranked if any(one is other for other in (*ranked[:MOST_LIKELY], other_heading))]
+    likely = [one for one in ranked if any(one is other for other in (*ranked[:MOST_LIKELY], *of_frames))]
     try:
         as_given = _fitted(robot, given)[0]
     except InputError:  # too few samples for a fit
@@ -96,15 +96,19 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
         return None
     simple = SIMPLER * min(one[0] for one in fitted)
     cost, size, frame, turned, whole, text = next(one for one in fitted if one[0] <= simple)
-    if as_given < np.inf and frame == "world":
-        more = _heading(robot, given, whole, up)
-        turned, whole = more * turned, more * whole
-        cost = _fitted(robot, _turned(given, whole))[0]
+    rest = 0.0  # median turn that nothing explains [rad]
+    if as_given < np.inf and frame:
+        more = _rest(robot, given, whole, frame, up)
+        turned, whole = ((more * one if frame == "world" else one * more) for one in (turned, whole))
+        cost, turns = _fitted(robot, _turned(given, whole))
+        rest = float(np.median(np.linalg.norm(turns["world"], axis=1)))
     if cost > LIKELIER * as_given:  # offsets and the CoM may explain the differences as well
         return None
     now, before = (quantity(np.degrees(part), "deg", 2) for part in (size, as_they_are[1]))
     looks = " and ".join(filter(None, (text, _said(frame, turned))))
     text = f"{looks}: they then differ from those computed from the lengths by {now} instead of {before}"
+    if rest > VISIBLE:
+        return Misread(f"{text}, and by {quantity(np.degrees(rest), 'deg', 2)} in a fit of the offsets", None)
     return Misread(text, _turned(given, whole))
 
 
@@ -123,22 +127,27 @@ def _turned(given: Measurements, rotation: Rotation) -> Measurements:
     return given.changed(poses=np.hstack([given.poses[:, :3], angles]))
 
 
-def _fitted(robot: Robot, given: Measurements) -> tuple[float, np.ndarray]:
-    """Return the sum of squares with offsets and the CoM fitted, and turns (n, 3) [rad] from measured orientations."""
+def _fitted(robot: Robot, given: Measurements) -> tuple[float, dict[str, np.ndarray]]:
+    """Return the sum of squares with offsets and the CoM fitted, and the turns from the measured orientations.
+
+    The turns are those of the world and of the sensor, in the axes of each, (n, 3) [rad].
+    """
     few = np.unique(np.linspace(0, len(given) - 1, min(len(given), MOST_FITTED)).astype(int))
     groups = ("offsets", "com") if robot.m < robot.dof_mask.sum() else ("offsets",)
     model = model_of(robot, given.only(np.isin(np.arange(len(given)), few)), groups, {})
     found = fit_from(model, model.begin(), length_of(robot), enough=ENOUGH)[0]
-    return found.cost, Rotation.from_matrix(found.state.turn).as_rotvec()
+    turns = Rotation.from_matrix(found.state.turn).as_rotvec()
+    seen = Rotation.from_matrix(model.poses(found.state)[1])  # a turn is the same in the axes that it leads to
+    return found.cost, {"world": turns, "sensor": seen.inv().apply(turns)}
 
 
-def _heading(robot: Robot, given: Measurements, rotation: Rotation, up: np.ndarray) -> Rotation:
-    """Return the turn about the vertical after which the platform's mean turn from the orientations is 0, or none."""
+def _rest(robot: Robot, given: Measurements, rotation: Rotation, frame: str, up: np.ndarray) -> Rotation:
+    """Return the turn of the world about the vertical, or of the sensor, after which the mean turn is 0, or none."""
 
-    def turn(angle: float) -> float:
-        other = _turned(given, Rotation.from_rotvec(angle * up) * rotation)
-        return float((_fitted(robot, other)[1] @ up).mean())
+    def mean(by: Rotation) -> np.ndarray:
+        turns = _fitted(robot, _turned(given, by * rotation if frame == "world" else rotation * by))[1][frame]
+        return turns.mean(axis=0) @ np.outer(up, up) if frame == "world" else turns.mean(axis=0)
 
-    first = turn(0.0)
-    second = turn(first)  # nearly linear in the heading
-    return Rotation.from_rotvec(first**2 / (first - second) * up if abs(second) < abs(first) else 0 * up)
+    first = mean(Rotation.identity())
+    again = float(mean(Rotation.from_rotvec(first)) @ first / max(first @ first, 1e-300))  # nearly linear in the turn
+    return Rotation.from_rotvec(first / (1 - again) if abs(again) < 1 else np.zeros(3))

@@ -25,6 +25,7 @@ from ...models import points
 from ...models.files import as_robot
 from ...models.robot import Robot
 from ..logs.clocks import LIKE, SURELY, realigned
+from ..logs.encoders import locked
 from ..logs.measurements import Measurements, check_measurements, measured, measured_poses, tracked
 from .attitudes import misread_attitudes
 from .differences import AS_GIVEN, FEWEST, PLAUSIBLE, LogPart, medians
@@ -45,6 +46,7 @@ MANY_CABLES = 6  # of fewer cables, frames explain what wrong anchors do
 DISPLACED = 3.0  # times smaller differences, by a frame near the file's
 LAST_STEP = 3  # of fits of frames: to readings as they are, up to scales, and twice with these scales
 FAR = 3.0  # times the noise, of differences that are not explained yet
+STILL = 2e-3  # of a length, by which the reading of a locked winch with noise may change
 OTHER_FACTOR, SAME_FACTOR = 0.1, 0.01  # from 1, and from those of units
 Placed = tuple[np.ndarray, np.ndarray, np.ndarray | None]  # positions, rotations, and poses of carriers
 
@@ -103,11 +105,8 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
         return Mistake(*attitudes) if attitudes else large
     rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), MOST_SAMPLES)).astype(int)]
     log, e = _part(robot, given.only(rows), table).sound()
-    if not _is_noise(log, e):
-        # The clock of the poses may be ahead, which another frame or convention does not explain.
-        moved, clock = realigned(robot, given, rows)
-        if clock is not None and clock.likeness > LIKE and abs(clock.offset) > SURELY * clock.sigma:
-            log, e = _part(robot, moved, table).sound()
+    if not _is_noise(log, e) and (aligned := _aligned(robot, given, rows, table)) is not None:
+        log, e = aligned.sound()
     order, e = np.arange(robot.m), e[:, : len(log.y)]
     noise = log.sigma * np.sqrt(1 + BY_CHANCE * np.sqrt(2 / e.size))
     if _is_noise(log, e):
@@ -115,15 +114,20 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     turns = bool(np.ptp(log.angles, axis=0).any()) and robot.dof_mask.sum() == 6  # with one angle, others would fit
     ways, as_given = _explanations(log, e, noise)
     best = min((way for way in ways if way.text), key=lambda way: way[:2])
+    still = locked(given.lengths, STILL)  # units, signs and order of such readings do not show
     change = float(np.median(np.abs(log.y - np.median(log.y, axis=0))))
-    named = best.weighted < as_given and best.size < EXPLAINED * change
+    if still:  # wrong anchors turn the cables, so they change lengths by a share of the motion
+        moved = float(np.median(np.linalg.norm(log.position - np.median(log.position, axis=0), axis=1)))
+        change = max(as_given, PLAUSIBLE * moved / EXPLAINED, noise / EXPLAINED)
+    named = not still and best.weighted < as_given and best.size < EXPLAINED * change
     far = best.size * best.way.factor > FAR * noise if named else as_given > EXPLAINED * change
     whole = _part(robot, given, table) if named or far else log
     given_order = log
-    for first, rivals in _orders(log) if far and framed and len(log.y) >= FEWEST[1] else ():
+    orders = () if not far or not framed or len(log.y) < FEWEST[1] else [(order, 0)] if still else _orders(log)
+    for first, rivals in orders:
         log = given_order._replace(y=given_order.y[:, first])
         part, read = log, AS_GIVEN
-        for step in range(LAST_STEP + 1):
+        for step in range(1 if still else LAST_STEP + 1):
             part = part._replace(counted=step == 1)
             if step < 2:
                 frames, read = fitted_frames(part), AS_GIVEN
@@ -134,6 +138,9 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
             moved = frames.of(whole.position, whole.at(read)[1])
             placed = frames.of(log.position, log.at(read)[1])
             there, left = log._replace(position=placed[0], rotation=placed[1]).sound()
+            if not step and not _is_noise(there, left):  # speeds show the clock in the right frame only
+                ordered = _corrected(given, (*moved, None), first, 1.0)
+                there, left = (_aligned(robot, ordered, rows, table) or there).sound()
             size = _rms(medians(left, len(there.y)))
             way = _Way(VERY_CLEARLY * size, size, "", AS_GIVEN, order, np.ones(robot.m))
             if step:
@@ -217,6 +224,16 @@ def _displaced(log: LogPart, given: Measurements, noise: float) -> Mistake | Non
     moved = np.linalg.norm(robot.attachments @ (turn - np.eye(3)).T + shift, axis=1).max()
     severe = bool(moved > PLAUSIBLE * length_of(robot))
     return Mistake(_better(str(frames), before, frames.size), corrected, severe)
+
+
+def _aligned(robot: Robot, given: Measurements, rows: np.ndarray, table: np.ndarray) -> LogPart | None:
+    """Return samples with the poses by the clock that cable speeds show, None if it is as good as theirs.
+
+    A clock of the poses that is ahead is explained by no other frame or convention.
+    """
+    moved, clock = realigned(robot, given, rows)
+    sure = clock is not None and clock.likeness > LIKE and abs(clock.offset) > SURELY * clock.sigma
+    return _part(robot, moved, table) if sure else None
 
 
 def _part(robot: Robot, part: Measurements, table: np.ndarray) -> LogPart:

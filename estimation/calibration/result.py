@@ -28,6 +28,7 @@ from .solving import Noise, Solved, covariance_of, inflation_of, is_still, lengt
 EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
 FAR = 5.0  # standard deviations of the prior
 FARTHEST = 0.5  # of the cables' length, by which an anchor or an attachment may be displaced
+MOST_WRONG = 1 / 3  # of the readings, beyond which a fit to the others means nothing
 
 
 class Parameter(NamedTuple):
@@ -81,8 +82,8 @@ class CalibrationData(Displayed):
         """Return why `save` and `towline calibrate` do not write the robot, in one line; None if they do.
 
         The log probably has an input error, the fit did not converge, an end of a cable or the CoM would move by more
-        than half of the cables' length (3 % if winches are locked), residuals exceed 3 % of it, the mass changes, or
-        validation samples fit worse than with the file's robot.
+        than half of the cables' length (3 % if winches are locked), residuals exceed 3 % of it, a third of the readings
+        are outliers, the mass changes, or validation samples fit worse than with the file's robot.
         """
         if self.doubt is not None:
             return self.doubt
@@ -97,6 +98,9 @@ class CalibrationData(Displayed):
             return (
                 f"no anchors and offsets explain the log: they leave residuals of {left}, so check clocks and sensors"
             )
+        if len(self.outliers) > MOST_WRONG * self.residuals.size:
+            share = f"{100 * len(self.outliers) / self.residuals.size:.0f} %"
+            return f"{share} of the readings do not fit the others, so check clocks, frames and sensors"
         if loads := load_changes(self._solved.model, self._solved.fit.state) if "mass" in self.free else []:
             texts = [f"{quantity(mass, 'kg', digits=3)} from sample {begin} on" for begin, mass in loads]
             return f"the mass changes during the log: {', '.join(texts)}; calibrate each part alone"

@@ -24,10 +24,10 @@ def readings_of(robot: Robot, lengths: np.ndarray) -> np.ndarray:
     return 2 * (lengths - offset) / (scale + np.copysign(root, scale))
 
 
-def locked(lengths: np.ndarray) -> bool:
-    """Return whether readings (N, m) hardly change, as those of locked winches."""
+def locked(lengths: np.ndarray, most: float = LOCKED) -> bool:
+    """Return whether readings (N, m) hardly change, by a share `most` of their size, as those of locked winches."""
     known = lengths[np.isfinite(lengths).all(axis=1)]
-    return len(known) > 1 and bool((np.ptp(known, axis=0) <= LOCKED * np.abs(known).max(axis=0)).all())
+    return len(known) > 1 and bool((np.ptp(known, axis=0) <= most * np.abs(known).max(axis=0)).all())
 
 
 def unrolled(readings: np.ndarray) -> tuple[np.ndarray, list[int]]:

@@ -177,7 +177,8 @@ class LogPoses(Displayed):
         if self.times is not None:
             columns, header = [self.times[:, None], *columns], ["t [s]", *header]
         with whole_file(file) as temporary:
-            np.savetxt(temporary, np.hstack(columns), "%.10g", ",", header=",".join(header), comments="")
+            formats = ["%.16g" if name.startswith("t ") else "%.10g" for name in header]  # times may count from 1970
+            np.savetxt(temporary, np.hstack(columns), formats, ",", header=",".join(header), comments="")
         return file
 
     def to_dict(self) -> dict[str, Any]:
@@ -244,7 +245,8 @@ def _by_more(robot: Robot, given: Measurements, sigma: np.ndarray, begin: float,
 
     measured = given.changed(sigma=given.sigma._asdict() | {"lengths": float(sigma.min())})
     misread = misread_attitudes(robot, measured) if oriented else None
-    measured = (misread.corrected if misread else measured) if oriented else measured.changed(poses=None)
+    corrected = misread.corrected if misread else None
+    measured = (measured if corrected is None else corrected) if oriented else measured.changed(poses=None)
     weights = sigma.min() / sigma
     blocks = [_block(robot, measured.only(slice(k, k + BLOCK)), weights) for k in range(0, len(given), BLOCK)]
     parts = (np.concatenate(part) for part in zip(*blocks, strict=True))
@@ -269,7 +271,7 @@ def _by_more(robot: Robot, given: Measurements, sigma: np.ndarray, begin: float,
         by_parameters=by_parameters if hanging and robot.uncertainty else None,
     )
     times = None if given.times is None else given.times + begin
-    if misread is not None:
+    if misread is not None and corrected is not None:
         return LogPoses(estimate, times, squares / excess**2, more, excess, misread.text)
     return LogPoses(estimate, times, squares / excess**2, more, excess, mistake=mistake(robot, given))
 
