@@ -1,5 +1,6 @@
 """Cable lengths and their derivatives by the numeric core, for varying parameters of a robot."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -57,6 +58,7 @@ def runs(
     return Runs(lengths.T.copy(), by_pose, by_geometry.swapaxes(0, 1).copy())
 
 
+@lru_cache(maxsize=16)
 def length_of(robot: Robot) -> float:
     """Return a length of the robot's cables, as a scale [m]: their mean at home."""
     return float(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean())
