@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from towline import InputError, load, plan, read_task, time_along
+from towline.models.part import PositiveRange
 from towline.ocp import Planner
+from towline.ocp.search.shortest_durations import _shortest
 
 HIGH, LOW, FAR = [-2, -1, 1.6], [-2, -1, 1], [2, 1, 1.6]
 BOX = {"mass": 300, "com": [0, 0, -0.4]}
@@ -131,3 +133,23 @@ def test_a_range_for_a_dwell_that_cannot_be_is_one_line(change, expected):
     with pytest.raises(InputError, match=expected) as refused:
         plan("cogiro", {"path": STILL, "duration": RANGE} | change)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(("power", "shortest"), [(1, 2.0), (2, 2.0), (1, 0.11), (3, 9.9)])
+def test_a_power_of_the_duration_is_found_from_a_few_audits(power, shortest):
+    """Of a speed, an acceleration and a jerk, which fall with the duration, its square and its cube."""
+    tried = []
+
+    def beyond(seconds):
+        tried.append(seconds)
+        return max((shortest / seconds) ** power - 1, 0.0)
+
+    found = _shortest(PositiveRange(min=0.1, max=10), beyond)
+    assert shortest <= found <= shortest * (1 + 1e-3)
+    assert len(tried) <= 5
+
+
+def test_undefined_values_do_not_end_the_search():
+    found = _shortest(PositiveRange(min=0.1, max=10), lambda seconds: np.inf if seconds < 3 else 0.0)
+    assert 3 <= found <= 3 * (1 + 1e-3)
+    assert _shortest(PositiveRange(min=0.1, max=10), lambda _: np.inf) == 10

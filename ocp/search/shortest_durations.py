@@ -3,6 +3,7 @@
 Each is the shortest that is feasible.
 """
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,6 +13,7 @@ from ...base.errors import InputError
 from ...base.text import quantity
 from ...models.part import PositiveRange
 from ..audits.audit import audit
+from ..audits.violation import relative_violation
 from ..plan import Plan
 from ..proofs.durations import Durations, durations
 from ..proofs.infeasible_ends import infeasible_ends
@@ -71,7 +73,7 @@ def _with_dwell(scenario: Scenario, span: PositiveRange) -> tuple[Scenario, Chos
         chosen = timed if audit(timed, None).passed else None
     if chosen is None:
         least = PositiveRange(min=max(span.min, scenario.path.resting * (1 + CLOSE)), max=span.max)
-        seconds = _shortest(least, lambda seconds: audit(scenario.held(seconds), None).passed)
+        seconds = _shortest(least, lambda seconds: _beyond(scenario.held(seconds)))
         chosen, message = scenario.held(seconds), f"{quantity(seconds, 's')} with the task's time law"
     too_slow = law is not None and law.feasible and BOUND * law.duration > span.max
     proven = too_slow or (law is not None and law.law is not None and law.law.certificate is not None)
@@ -81,8 +83,8 @@ def _with_dwell(scenario: Scenario, span: PositiveRange) -> tuple[Scenario, Chos
 def _shortest_phases(scenario: Scenario) -> tuple[Scenario, Chosen | None]:
     """Return the scenario with a number for each duration of a phase, and the stage that chose them.
 
-    A phase is audited alone, from the shortest duration on that its tensions allow (`durations`), at ever larger steps,
-    which are then halved. What its neighbours require of it, such as loads that the ground takes up, is only known to
+    A phase is audited alone, from the shortest duration on that its tensions allow (`durations`), at the
+    durations at which its limits seem to be kept (`_shortest`). What its neighbours require of it, such as loads that the ground takes up, is only known to
     the audit of the whole. A phase that is not even feasible at its longest duration keeps this, and so do those left
     when the task's time limit has passed. A scenario without a range of a phase is returned as it is.
 
@@ -110,32 +112,41 @@ def _shortest_phases(scenario: Scenario) -> tuple[Scenario, Chosen | None]:
             message, seconds = "time limit", span.max
         else:
             left = _left(lasting(span.max))
-            seconds = _shortest(span, lambda seconds: audit(lasting(seconds), None).passed, left)
+            seconds = _shortest(span, lambda seconds: _beyond(lasting(seconds)), left)
         phases[index] = phases[index].model_copy(update={"duration": seconds})
     chosen = lay_out(scenario.robot, task.model_copy(update={"phases": tuple(phases)}))
     message = ", ".join(filter(None, [message, f"motion of {quantity(chosen.duration, 's')}"]))
     return chosen, Chosen(PlannerStep("durations of phases", message, time.perf_counter() - start))
 
 
-def _shortest(of: PositiveRange, feasible: Callable[[float], bool], left: Durations | None = None) -> float:
+def _shortest(of: PositiveRange, beyond: Callable[[float], float], left: Durations | None = None) -> float:
     """Return the shortest feasible duration of a range [s], or its longest if that is not feasible either.
 
-    No duration but those that are `left` is feasible, if that is known.
+    `beyond` returns by how much a duration exceeds its limits, as a share of them. Speeds fall with the duration,
+    accelerations with its square and jerks with its cube, so two excesses show at which duration the limit is kept. No
+    duration but those that are `left` is feasible, if that is known.
     """
     if left is not None and not left.leave(of.min, of.max):
         return of.max
     low = min(max(of.min, LEAST, 0.0 if left is None else left.shortest), of.max)
-    if feasible(low):
+    if not (excess := beyond(low)):
         return low
-    step = CLOSE  # first: where the tensions decide, the shortest is near
-    while not feasible(high := min((1 + step) * low, of.max)):
+    power, step = 3.0, CLOSE  # first: where the tensions decide, the shortest is near
+    while excess_there := beyond(high := min(max((1 + excess) ** (1 / power) + CLOSE / 2, 1 + step) * low, of.max)):
         if high == of.max:
             return high
-        low, step = high, 4 * step
+        power = max(1.0, (math.log1p(excess) - math.log1p(excess_there)) / math.log(high / low))  # also of nan
+        low, excess, step = high, excess_there, 4 * step
+    middle = high / (1 + CLOSE)
     while high > (1 + CLOSE) * low:
+        low, high = (middle, high) if beyond(middle) else (low, middle)
         middle = (low * high) ** 0.5
-        low, high = (low, middle) if feasible(middle) else (middle, high)
     return high
+
+
+def _beyond(scenario: Scenario) -> float:
+    """Return by how much a motion of the references alone exceeds its limits, as a share of them."""
+    return relative_violation(scenario, audit(scenario, None))
 
 
 def _left(alone: Scenario) -> Durations | None:
