@@ -257,6 +257,7 @@ def test_offsets_hide_how_an_ahrs_is_mounted(tmp_path):
     assert "the sensor of the orientations looks turned by" in found.text
     left = Rotation.from_euler("xyz", found.corrected.poses[:, 3:]) * Rotation.from_rotvec(turns).inv()
     assert np.degrees(left.mean().magnitude()) < 1.0
+    assert mistake(robot, found.corrected) is None
 
 
 def test_without_a_fit_only_clear_differences_of_orientations_are_errors(tmp_path, monkeypatch):

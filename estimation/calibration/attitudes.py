@@ -102,7 +102,8 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
         turned, whole = ((more * one if frame == "world" else one * more) for one in (turned, whole))
         cost, turns = _fitted(robot, _turned(given, whole))
         rest = float(np.median(np.linalg.norm(turns["world"], axis=1)))
-    if cost > LIKELIER * as_given:  # offsets and the CoM may explain the differences as well
+    small = bool(frame) and not text and turned.magnitude() < VISIBLE
+    if small or cost > LIKELIER * as_given:  # offsets and the CoM may explain the differences as well
         return None
     now, before = (quantity(np.degrees(part), "deg", 2) for part in (size, as_they_are[1]))
     looks = " and ".join(filter(None, (text, _said(frame, turned))))
