@@ -135,9 +135,9 @@ def test_a_range_for_a_dwell_that_cannot_be_is_one_line(change, expected):
     assert "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize(("power", "shortest"), [(1, 2.0), (2, 2.0), (1, 0.11), (3, 9.9)])
+@pytest.mark.parametrize(("power", "shortest"), [(1, 2.0), (2, 2.0), (1, 0.11), (1.5, 9.9)])
 def test_a_power_of_the_duration_is_found_from_a_few_audits(power, shortest):
-    """Of a speed, an acceleration and a jerk, which fall with the duration, its square and its cube."""
+    """Of a speed and an acceleration, which fall with the duration and its square, and of a power between."""
     tried = []
 
     def beyond(seconds):

@@ -83,10 +83,11 @@ def _with_dwell(scenario: Scenario, span: PositiveRange) -> tuple[Scenario, Chos
 def _shortest_phases(scenario: Scenario) -> tuple[Scenario, Chosen | None]:
     """Return the scenario with a number for each duration of a phase, and the stage that chose them.
 
-    A phase is audited alone, from the shortest duration on that its tensions allow (`durations`), at the
-    durations at which its limits seem to be kept (`_shortest`). What its neighbours require of it, such as loads that the ground takes up, is only known to
-    the audit of the whole. A phase that is not even feasible at its longest duration keeps this, and so do those left
-    when the task's time limit has passed. A scenario without a range of a phase is returned as it is.
+    A phase is audited alone, from the shortest duration on that its tensions allow (`durations`), at the durations at
+    which its limits seem to be kept (`_shortest`). What its neighbours require of it, such as loads that the ground
+    takes up, is only known to the audit of the whole. A phase that is not even feasible at its longest duration keeps
+    this, and so do those left when the task's time limit has passed. A scenario without a range of a phase is returned
+    as it is.
 
     Raises `InputError` if a phase has a range although tube or base leave the motion free.
     """
@@ -122,16 +123,16 @@ def _shortest_phases(scenario: Scenario) -> tuple[Scenario, Chosen | None]:
 def _shortest(of: PositiveRange, beyond: Callable[[float], float], left: Durations | None = None) -> float:
     """Return the shortest feasible duration of a range [s], or its longest if that is not feasible either.
 
-    `beyond` returns by how much a duration exceeds its limits, as a share of them. Speeds fall with the duration,
-    accelerations with its square and jerks with its cube, so two excesses show at which duration the limit is kept. No
-    duration but those that are `left` is feasible, if that is known.
+    `beyond` returns by how much a duration exceeds its limits, as a share of them. Speeds fall with the duration and
+    accelerations with its square, so two excesses show at which duration the limit is kept. No duration but those that
+    are `left` is feasible, if that is known.
     """
     if left is not None and not left.leave(of.min, of.max):
         return of.max
     low = min(max(of.min, LEAST, 0.0 if left is None else left.shortest), of.max)
     if not (excess := beyond(low)):
         return low
-    power, step = 3.0, CLOSE  # first: where the tensions decide, the shortest is near
+    power, step = 2.0, CLOSE  # first: where the tensions decide, the shortest is near
     while excess_there := beyond(high := min(max((1 + excess) ** (1 / power) + CLOSE / 2, 1 + step) * low, of.max)):
         if high == of.max:
             return high
