@@ -192,10 +192,10 @@ def _compare(solved: Solved, sets: list[tuple[str, ...]], prior: dict[str, float
     of = solved.model
     wholes = {}
     for clock in {"clock" in one for one in sets} | {False}:
-        whole = model_of(of.robot, measurements, ("clock",) if clock else (), {}, of.track)
+        whole = model_of(of.robot, measurements, ("clock",) if clock else (), {}, of.track, weights)
         of_forces: dict[str, Any] = {name: getattr(of, name) for name in ("noise", "unbalanced", "ahead")}
         of_forces["felt"] = of.felt or carrying(of, solved.fit.state)
-        wholes[clock] = replace(whole, weights=weights, weighs=weighs, **of_forces)
+        wholes[clock] = replace(whole, weighs=weighs, **of_forces)
     if len(measurements) > MOST_COMPARED:
         rows = np.linspace(0, len(measurements) - 1, MOST_COMPARED).astype(int)
         wholes = {clock: whole.only(rows) for clock, whole in wholes.items()}

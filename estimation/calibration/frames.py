@@ -255,9 +255,10 @@ def _locked(robot: Robot, x: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np.
 
     - `x`, `R`: positions (S, N, 3) and rotations (S, N, 3, 3).
     """
-    moves, axes, length = robot.dof_mask > 0, np.eye(3), length_of(robot)
+    moves = robot.dof_mask > 0
     if moves[:3].all() and np.count_nonzero(moves[3:]) >= 2:
         return np.zeros((len(x), 0, x.shape[1])), np.zeros((len(x), 0, x.shape[1], 2, 3))
+    axes, length = np.eye(3), length_of(robot)
     apart = R @ points.rotations(robot.home[3:]).T  # turns from home
     values, derivatives = [], []
     for axis in np.flatnonzero(~moves[:3]):

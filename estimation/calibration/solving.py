@@ -251,14 +251,16 @@ def model_of(
     groups: tuple[str, ...],
     prior: dict[str, float],
     track: PoseTrack | None = None,
+    weights: np.ndarray | None = None,
 ) -> Model:
     """Return the model of checked arguments, which starts with level poses where none are measured.
 
-    `track` is that of a model with the same poses, which needs as much memory as the log.
+    `track` is that of a model with the same poses, which needs as much memory as the log. `weights` are those of
+    `Model`; default: of all readings but those of `left_out`.
     """
     parameters = Parameters(robot, groups)
-    taken = ~np.any(list(left_out(robot, measurements).values()), axis=0).T
-    model = Model(parameters, measurements, prior, taken, forces=Balance(robot, measurements))
+    weights = ~np.any(list(left_out(robot, measurements).values()), axis=0).T if weights is None else weights
+    model = Model(parameters, measurements, prior, weights, forces=Balance(robot, measurements))
     if "clock" in groups:
         if track is None:
             position, rotation, _ = measured_poses(robot, measurements)
