@@ -40,6 +40,9 @@ FORMS = {
     "names between spaces": "t   l0 l1\n" + rows(T, "  "),
     "as numpy.savetxt": "# t l0 l1\n" + rows(T, " "),
     "tabs and spaces": "#t l0 l1\n" + rows(T, " \t"),
+    "a timetable of MATLAB": "Time,l_1,l_2\n" + rows(f"{s:g} sec" for s in T),
+    "names of PLCs": "t;PLC_PRG.arLength[1];PLC_PRG.arLength[2]\n" + rows(T, ";"),
+    "names of axes": "t;gWinch[0].ActPos;gWinch[1].ActPos\n" + rows(T, ";"),
     "words for units": "Time [sec],Length 1 (millimeters),Length 2 (millimeters)\n"
     + "".join(f"{s},{1e3 * a:.12f},{1e3 * b:.12f}\n" for s, (a, b) in zip(T, LENGTHS.tolist(), strict=True)),
 }
@@ -55,6 +58,17 @@ def test_forms_of_times_and_names(form, tmp_path):
     np.testing.assert_allclose(read.measurements.lengths, LENGTHS, rtol=1e-9)
     if "dates" in form or "stamps" in form:
         assert read.begin == NOON
+
+
+@pytest.mark.parametrize("names", ["TCP_A TCP_B TCP_C", "ox oy oz ow", "Roll Pitch Yaw Rot[0] Rot[1] Rot[2] Rot[3]"])
+def test_names_of_orientations(names, tmp_path):
+    names = names.split()
+    values = dict(zip(names, np.eye(len(names))[3] if "ow" in names else [0.1, 0.2, 0.3, 0, 1, 0, 1], strict=False))
+    text = ",".join(["t", "l0", "l1", "x", "y", "z", *names])
+    lines = [",".join(map(str, (t, *pair, 1, 2, 3, *values.values()))) for t, pair in zip(T, LENGTHS, strict=True)]
+    (tmp_path / "log.csv").write_text(text + "\n" + "\n".join(lines) + "\n")
+    poses = read_log(tmp_path / "log.csv").measurements.poses
+    np.testing.assert_allclose(poses[:, 3:], np.tile([0, 0, 0] if "ow" in names else [0.1, 0.2, 0.3], (len(T), 1)))
 
 
 def test_the_body_of_a_motion_capture_without_times(tmp_path):

@@ -165,8 +165,8 @@ def test_headers_of_motion_capture_and_units_below_names(tmp_path):
     """The export of a motion capture system: bodies, markers and axes in lines above each other."""
     text = (
         "Format Version,1.23,Take Name,Take 1,Capture Frame Rate,100\n\n"
-        ",,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Marker,Marker,Marker\n"
-        ',,platform,platform,platform,platform,platform,platform,platform,"platform:1","platform:1","platform:1"\n'
+        ",Type,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Marker,Marker,Marker\n"
+        ',Name,platform,platform,platform,platform,platform,platform,platform,"platform:1","platform:1","platform:1"\n'
         ",,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Position,Position,Position\n"
         "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,X,Y,Z\n"
     )

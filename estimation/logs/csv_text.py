@@ -15,6 +15,7 @@ LENGTH_UNITS = re.compile(r"(?i)length units?[,;:=\t ]+([a-z]+)")
 DECIMAL_COMMA = re.compile(r"\s*[-+]?\d*,\d+(?:[eE][-+]?\d+)?\s*")
 _CLOCK = r"\d\d?:\d\d:\d\d(?:\.\d+)?"
 DATE = re.compile(rf"(?<![\d-])\d{{4}}-\d\d-\d\d[T ]{_CLOCK}(?:Z|[+-]\d\d:?\d\d)?")
+DURATION = re.compile(r"(?m)^(\d+(?:\.\d+)?) sec(?=[,;\t])")  # of a timetable of MATLAB
 HEADER = "t [s], l0 [m], l1 [m], x [m], y [m], z [m]"
 LABVIEW = "***End_of_Header***"
 # Rates [Hz] of motion capture systems: FREQUENCY of Qualisys, the second line of Vicon.
@@ -33,6 +34,7 @@ def plain_csv(text: str) -> str:
     other kinds.
     """
     text = f"#{text[1:]}" if text[:2] == "% " else text  # of MATLAB
+    text = DURATION.sub(r"\1", text) if DURATION.search("\n".join(_head(text))) else text
     return _one_header(_with_points(_with_seconds(_with_tabs(text))))
 
 
@@ -130,6 +132,8 @@ def _of_rows(rows: Sequence[list[str]], head: str) -> tuple[list[str], list[str]
     units = [cell.strip("[]()") for cell in rows[-1]]
     stated = len(rows) > 1 and all(unit in KNOWN_UNITS for unit in units)
     *above_names, last = rows[: len(rows) - stated]
+    if last[1:2] and last[1].startswith("Time"):  # below the words Type, Name and Parent of OptiTrack
+        above_names = [[row[0], "", *row[2:]] for row in above_names]
     # The name of a body may stand above the first of its columns only, or before the name of this column (Qualisys).
     above_names = [list(accumulate(row, lambda before, cell: cell or before)) for row in above_names]
     bodies = [cell[:-2] if cell.endswith(" X") and after == "Y" else "" for cell, after in pairwise([*last, ""])]

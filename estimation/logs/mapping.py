@@ -233,6 +233,9 @@ def _usual(
         if key[2] in AXES and not names & set(AXES[key[2]]) and not any(names == set(axes) for axes in OTHER_AXES):
             del groups[key]  # position[0] to position[7]
             continue
+        if key[2] == "quaternion" and re.search("(^|[./_ ])o[./_ ]?#$", key[3]) and "w" not in names:
+            del groups[key]  # ox, oy, oz of an origin
+            continue
         if key[2] == "quaternion" and re.search("r#$|rot", key[3]) and "w" not in names:
             del groups[key]  # rx, ry, rz or rot_x, rot_y, rot_z alone are angles
             key = (*key[:2], "angles", key[3])
@@ -299,6 +302,7 @@ def _usual(
         ("lengths", lambda one: not re.search(TURNED, one[0].full.lower())),  # l1 rather than angle_1
         ("position", lambda one: "Pose" in one[0].topic.kind),  # messages of poses rather than transforms and scenes
         ("position orientation", lambda one: bool(OF_PLATFORM.search(one[0].full))),  # rather than those of cameras
+        ("orientation", lambda one: not re.search(r"(?i)rot\[\d\]$", one[0].full)),  # of the matrix of Qualisys
         (what, lambda one: not position or one[0].topic is position[0].topic),
     )
     for of, is_better in better:

@@ -88,13 +88,14 @@ PATTERNS = {
         rf"{_BEFORE}(?:(?:cable|rope|wire|tether)[_ ]?)?{_DIRECTION}(){_VECTOR}",  # of the only cable of a carrier
     ),
     "quaternion": (
-        rf"{_BEFORE}(?:ori(?:entation)?|rot(?:ation)?|quaternion|quat|q)[./_ ]?([xyzw])",
+        rf"{_BEFORE}(?:ori(?:entation)?|rot(?:ation)?|quaternion|quat|q|o)[./_ ]?([xyzw])",
         r"(?:.*/)?r([xyzw])",
         rf"{_BEFORE}q(?:uat)?_?\[?([0-3])\]?",  # w, x, y, z, as in logs of PX4
     ),
     "angles": (
         rf"{_BEFORE}(roll|pitch|yaw|heading|phi|theta|psi)",
         r"(?:.*/)?r([xyz])",  # with a unit
+        rf"{_BEFORE}(?:tcp|ee|(?:end[_ ]?)?effector|pose)[./_ ]([abc])",  # about x, y, z, of machine tools (ISO 841)
         rf"{_BEFORE}(?:euler|rot|ang(?:les?)?|rpy)[./_ ]?(?:ang(?:les?)?[./_ ]?)?\[?([xyz012])\]?",
     ),
     "efforts": (r"/?cables[./]joints\[[^\]]*?(\d+)\]\.effort",),  # tensions in what towline writes
@@ -143,12 +144,12 @@ _WORDS |= {"deg": "deg|degrees?|°", "rad": "rad|radians?", "m": "m|met(?:er|re)
 _SUFFIX = re.compile(rf"(.+?)\s*(?:[_ ]|\()({'|'.join(_WORDS.values())})\)?")
 
 
-ANGLE_OF: dict[str, str] = dict(zip("xyz012", 2 * ("roll", "pitch", "yaw"), strict=True))
+ANGLE_OF: dict[str, str] = dict(zip("xyz012abc", 3 * ("roll", "pitch", "yaw"), strict=True))
 ANGLE_OF |= {"phi": "roll", "theta": "pitch", "psi": "yaw", "heading": "yaw"}
 
 
-# Names of PLCs begin with a type (fbAxis), vectors of Simulink count from 1 (Quat(4)), and some names are German.
-_TYPE = re.compile(r"(?<![A-Za-z])(?:fb|st|lr|[afinr])(?=[A-Z][a-z])")
+# Names of PLCs begin with a type (fbAxis, arLength), vectors of Simulink count from 1 (Quat(4)), some names are German.
+_TYPE = re.compile(r"(?<![A-Za-z])(?:a?(?:fb|st|lr|[finr])|[ag])(?=[A-Z][a-z])")
 _INDEX = re.compile(r"(?<![a-z])(q|quat(?:ernion)?|p|pos(?:ition)?|xyz|rpy|euler|angles?)\((\d+)\)")
 _GERMAN = {"uhrzeit": "time", "zeit": "time", "stempel": "stamp", "winde": "winch", "seil": "cable", "kraft": "force"}
 _GERMAN |= {"länge": "length", "plattform": "platform", "winkel": "", "nick": "pitch", "gier": "yaw"}
