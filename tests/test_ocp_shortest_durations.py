@@ -103,6 +103,13 @@ def test_a_path_that_dwells_has_the_fastest_time_law_and_rests_as_long_as_its_dw
         assert np.abs(motion.velocity[there]).max() < 1e-3
 
 
+def test_a_phase_that_dwells_lasts_longer_than_its_dwells():
+    phase = {"name": "tour", "path": STILL, "duration": RANGE}
+    found = plan("cogiro", {"phases": [phase]})
+    assert found.feasible
+    assert not plan("cogiro", {"phases": [lasting(phase, 0.998 * found.duration)]}).feasible
+
+
 def test_a_limit_that_time_laws_do_not_know_takes_the_shortest_duration_of_the_own_law():
     most = 50.0  # [m/s^3]
     task = {"path": STILL, "limits": {"cable_jerk": most}}
@@ -144,12 +151,12 @@ def test_a_power_of_the_duration_is_found_from_a_few_audits(power, shortest):
         tried.append(seconds)
         return max((shortest / seconds) ** power - 1, 0.0)
 
-    found = _shortest(PositiveRange(min=0.1, max=10), beyond)
+    found = _shortest(PositiveRange(min=0.1, max=10), 0.0, beyond)
     assert shortest <= found <= shortest * (1 + 1e-3)
     assert len(tried) <= 5
 
 
 def test_undefined_values_do_not_end_the_search():
-    found = _shortest(PositiveRange(min=0.1, max=10), lambda seconds: np.inf if seconds < 3 else 0.0)
+    found = _shortest(PositiveRange(min=0.1, max=10), 0.0, lambda seconds: np.inf if seconds < 3 else 0.0)
     assert 3 <= found <= 3 * (1 + 1e-3)
-    assert _shortest(PositiveRange(min=0.1, max=10), lambda _: np.inf) == 10
+    assert _shortest(PositiveRange(min=0.1, max=10), 0.0, lambda _: np.inf) == 10

@@ -72,8 +72,7 @@ def _with_dwell(scenario: Scenario, span: PositiveRange) -> tuple[Scenario, Chos
         timed = lay_out(scenario.robot, task.model_copy(update={"path": law.law.path, "duration": None}))
         chosen = timed if audit(timed, None).passed else None
     if chosen is None:
-        least = PositiveRange(min=max(span.min, scenario.path.resting * (1 + CLOSE)), max=span.max)
-        seconds = _shortest(least, lambda seconds: _beyond(scenario.held(seconds)))
+        seconds = _shortest(span, scenario.path.resting, lambda seconds: _beyond(scenario.held(seconds)))
         chosen, message = scenario.held(seconds), f"{quantity(seconds, 's')} with the task's time law"
     too_slow = law is not None and law.feasible and BOUND * law.duration > span.max
     proven = too_slow or (law is not None and law.law is not None and law.law.certificate is not None)
@@ -104,6 +103,7 @@ def _shortest_phases(scenario: Scenario) -> tuple[Scenario, Chosen | None]:
             "free, got a range"
         )
     message = ""
+    assert isinstance(task.path, SequencePath)
     for index, span in ranged:
 
         def lasting(seconds: float, index: int = index) -> Scenario:
@@ -113,23 +113,26 @@ def _shortest_phases(scenario: Scenario) -> tuple[Scenario, Chosen | None]:
             message, seconds = "time limit", span.max
         else:
             left = _left(lasting(span.max))
-            seconds = _shortest(span, lambda seconds: _beyond(lasting(seconds)), left)
+            resting = task.path.parts[index].path.resting
+            seconds = _shortest(span, resting, lambda seconds: _beyond(lasting(seconds)), left)
         phases[index] = phases[index].model_copy(update={"duration": seconds})
     chosen = lay_out(scenario.robot, task.model_copy(update={"phases": tuple(phases)}))
     message = ", ".join(filter(None, [message, f"motion of {quantity(chosen.duration, 's')}"]))
     return chosen, Chosen(PlannerStep("durations of phases", message, time.perf_counter() - start))
 
 
-def _shortest(of: PositiveRange, beyond: Callable[[float], float], left: Durations | None = None) -> float:
+def _shortest(
+    of: PositiveRange, resting: float, beyond: Callable[[float], float], left: Durations | None = None
+) -> float:
     """Return the shortest feasible duration of a range [s], or its longest if that is not feasible either.
 
-    `beyond` returns by how much a duration exceeds its limits, as a share of them. Speeds fall with the duration and
-    accelerations with its square, so two excesses show at which duration the limit is kept. No duration but those that
-    are `left` is feasible, if that is known.
+    It is more than the time `resting` [s] for which the path dwells. `beyond` returns by how much a duration exceeds
+    its limits, as a share of them. Speeds fall with the duration and accelerations with its square, so two excesses
+    show at which duration the limit is kept. No duration but those that are `left` is feasible, if that is known.
     """
     if left is not None and not left.leave(of.min, of.max):
         return of.max
-    low = min(max(of.min, LEAST, 0.0 if left is None else left.shortest), of.max)
+    low = min(max(of.min, LEAST, resting * (1 + CLOSE), 0.0 if left is None else left.shortest), of.max)
     if not (excess := beyond(low)):
         return low
     power, step = 2.0, CLOSE  # first: where the tensions decide, the shortest is near
