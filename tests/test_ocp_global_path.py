@@ -5,6 +5,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 from towline import InputError, tensions
 from towline.benchmarks.scenes import APART, GATE, LENGTH, LOAD, QUADROTOR, TREES, forest, window
@@ -272,6 +273,32 @@ def test_a_load_all_the_way_hangs_on_a_path_as_the_weight_of_a_heavier_platform_
     assert 0 < (others.worst == -1).sum() < 300
     np.testing.assert_array_equal(kept.slack, others.slack)
     assert is_open(ours)
+
+
+@pytest.mark.parametrize("name", ["cogiro", "ipanema-1"])
+def test_tensions_at_rest_are_found_wherever_a_linear_program_finds_some(name):
+    """Those of least norm seldom fit ipanema-1: the ones nearest to the middle of the limits, or the solver, decide."""
+    robot = load(name)
+    rng, n = np.random.default_rng(5), 60
+    moves = np.hstack(
+        [rng.uniform(-0.35, 0.35, (n, 3)) * np.ptp(robot.home_anchors, axis=0), rng.uniform(-0.5, 0.5, (n, 3))]
+    )
+    end = robot.home + np.eye(6)[0]
+    path = {"kind": "line", "start": robot.home.tolist(), "end": end.tolist()}
+    poses, scenario = robot.home + moves, scenario_of([], robot, path=path)
+    kept = AtRest(scenario, 1.0, spare=0.0)(poses, np.zeros((n, len(robot.carriers), 6)))
+    moments = robot.wrench_scale[:, None]
+    exist = [
+        linprog(
+            np.zeros(robot.m),
+            A_eq=moments * scenario.dynamics.wrench_matrix(pose),
+            b_eq=robot.wrench_scale * [0, 0, robot.weight, 0, 0, 0],
+            bounds=np.transpose(scenario.bounds()),
+        ).success
+        for pose in poses
+    ]
+    assert 2 < sum(exist) < n
+    np.testing.assert_array_equal(kept.worst != -1, exist)
 
 
 def test_places_on_the_axis_of_a_swivelling_pulley_are_not_tried():

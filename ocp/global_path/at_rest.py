@@ -65,14 +65,19 @@ class AtRest:
     def __call__(self, platform: np.ndarray, carriers: np.ndarray, off_path: np.ndarray | None = None) -> Kept:
         """Return by how much limits are kept by platform (n, 6) and carriers (n, c, 6)."""
         points = self.scenario.moving_points(platform, carriers)
-        A, w, tensions, exist, spans = self._balance(platform, carriers)
+        A, w, tensions, exist, inverse = self._balance(platform, carriers)
         tilted = with_tilts(self.scenario, A, tensions, carriers, np.zeros_like(carriers))
         slack, worst = self._slack(platform, tilted, tensions, off_path)
         # The exact solver decides only where nothing else does: it takes longer than all limits.
         exist |= not self.balance
         open_ones = np.flatnonzero((slack >= 0.0) & ~exist)
-        if open_ones.size and spans:
-            exist[open_ones] = solve_batch(A[open_ones], w[open_ones], *self._bounds).feasible
+        if open_ones.size and inverse is not None:
+            low, high = self._bounds
+            _, missed = self._nearest(A[open_ones], w[open_ones], inverse[open_ones], (low + high) / 2)
+            exist[open_ones] = missed <= BALANCED * self.scenario.robot.force_scale
+            open_ones = open_ones[~exist[open_ones]]
+            if open_ones.size:
+                exist[open_ones] = solve_batch(A[open_ones], w[open_ones], *self._bounds).feasible
         return Kept(np.where(exist, slack, np.minimum(slack, -self.size)), points, np.where(exist, worst, -1))
 
     @cached_property
@@ -92,10 +97,11 @@ class AtRest:
 
     def _balance(
         self, platform: np.ndarray, carriers: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, bool]:
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]:
         """Return A (n, 6, m) and w (n, 6) in newtons, and the tensions of least norm, cut to their limits, (n, m).
 
-        Then at which of the poses they balance what there is at rest, and whether A spans all wrenches.
+        Then at which of the poses they balance what there is at rest, and the inverse of A (n, m, 6), None where A does
+        not span all wrenches.
         """
         scenario, robot = self.scenario, self.scenario.robot
         A = scaled(scenario, scenario.dynamics.wrench_matrix(platform, carriers))
@@ -107,9 +113,21 @@ class AtRest:
             times, still = np.zeros(len(platform)), Motion.still(platform)
             w = scaled(scenario, scenario.required_wrench(times, still, wind=scenario.wind))
         few, inverse = few_and_inverse(A, len(robot.platform.dof))
-        tensions = np.clip((inverse @ w[..., None])[..., 0], *self._bounds)
-        missed = np.linalg.norm((A @ tensions[..., None])[..., 0] - w, axis=1)
-        return A, w, tensions, known & (missed <= (MISSED if few else BALANCED) * robot.force_scale), not few
+        tensions, missed = self._nearest(A, w, inverse, np.zeros(robot.m))
+        exist = known & (missed <= (MISSED if few else BALANCED) * robot.force_scale)
+        return A, w, tensions, exist, None if few else inverse
+
+    def _nearest(
+        self, A: np.ndarray, w: np.ndarray, inverse: np.ndarray, to: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the tensions nearest to others (m,) that balance w, cut to their limits, (n, m), and what they miss.
+
+        Those nearest to the middle of the limits are often inside them where those of least norm are not.
+
+        Source: Pott, Bruckmann and Mikelsons, Closed-form force distribution for parallel wire robots, 2009.
+        """
+        tensions = np.clip(to + (inverse @ (w - A @ to)[..., None])[..., 0], *self._bounds)
+        return tensions, np.linalg.norm((A @ tensions[..., None])[..., 0] - w, axis=1)
 
     def _slack(
         self, platform: np.ndarray, carriers: np.ndarray, tensions: np.ndarray, off_path: np.ndarray | None
