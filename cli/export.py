@@ -51,8 +51,8 @@ def export(
         from ..export.step import export_step
 
         folder = export_step(loaded, step, "float" if single else "double")
-        files = {"folder": folder, "files": sorted(folder.iterdir())}
-        print_result(as_json, {"robot": loaded.name, **files}, lambda: str(folder))
+        files = sorted(folder.iterdir())
+        print_result(as_json, {"robot": loaded.name, "folder": folder, "files": files}, None, files)
         return
     if fmu is not None:
         from ..export.fmu import export_fmu
@@ -61,8 +61,8 @@ def export(
         check_outputs({"--fmu": check_ending("--fmu", fmu, ".fmu")})
         start = reference if reference is None or reference.endswith(".nc") else numbers("--reference", reference, 6)
         platform = export_fmu(loaded, fmu, part, drive, start)
-        with_binary = str(fmu) if platform else f"{fmu}, with sources only: there is no C compiler (cc, or CC)"
-        print_result(as_json, {"robot": loaded.name, "file": fmu, "binary": platform}, lambda: with_binary)
+        report = None if platform else lambda: "There is no C compiler (cc, or CC), so the FMU has sources only."
+        print_result(as_json, {"robot": loaded.name, "file": fmu, "binary": platform}, report, [fmu])
         return
     ending = ".xml" if mjcf else ".c"
     path = out if out is not None else Path(f"{loaded.name}{ending}")
@@ -77,4 +77,4 @@ def export(
         text = to_c(loaded)
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    print_result(as_json, {"robot": loaded.name, "file": path}, lambda: str(path))
+    print_result(as_json, {"robot": loaded.name, "file": path}, None, [path])

@@ -5,7 +5,7 @@ from pathlib import Path
 import typer
 
 from ..base.inputs import check_ending
-from .options import PLAIN, Command, JsonOption, parameters, print_json
+from .options import PLAIN, Command, JsonOption, parameters, print_json, print_written
 from .outputs import check_outputs
 
 app = typer.Typer(**PLAIN)
@@ -41,7 +41,10 @@ def caspr(folder: Path, cable_set: str | None = None, out: Path | None = None, a
         converted = result.robot.model_dump(mode="json", exclude_none=True)
         print_json({"name": result.robot.name, **fields, "file": out, "robot": converted})
         return
-    typer.echo(text if out is None else f"  {out}", nl=out is not None)
+    if out is None:
+        typer.echo(text, nl=False)
+    else:
+        print_written([out])
     # Standard output may be the robot file itself: notes go to standard error.
     for note in result.notes:
         typer.echo(f"note: {note}", err=True)

@@ -176,12 +176,15 @@ def print_written(files: Iterable[object]) -> None:
     typer.echo("\n    ".join(["  Written", *map(str, files)]))
 
 
-def print_result(as_json: bool, data: dict[str, Any], report: Callable[[], str], files: Sequence[object] = ()) -> None:
-    """Print a result: as JSON, or its report and the files that a command has written."""
+def print_result(
+    as_json: bool, data: dict[str, Any], report: Callable[[], str] | None, files: Sequence[object] = ()
+) -> None:
+    """Print a result: as JSON, or its report, if it has one, and the files that a command has written."""
     if as_json:
         print_json(data)
         return
-    typer.echo(report())
+    if report is not None:
+        typer.echo(report())
     if files:
         print_written(files)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .options import JsonOption, parameters, print_json, print_table, robot_names
+from .options import JsonOption, parameters, print_json, print_table, print_written, robot_names
 from .outputs import check_outputs
 
 if TYPE_CHECKING:
@@ -75,6 +75,8 @@ def robots(
             print_json(result)
         else:
             _show(robot, result, at_home, box)
+            if figure is not None:
+                print_written([figure])
 
 
 def _list(library: list[dict[str, Any]], as_json: bool) -> None:

@@ -59,7 +59,7 @@ def view(
     summary = {"kind": subject.kind, "robot": subject.robot.name} | ({} if other is None else {"other": other})
     if html is not None:
         written = save_page(subject, html)
-        print_result(as_json, {**summary, "file": written}, lambda: str(written))
+        print_result(as_json, {**summary, "file": written}, None, [written])
         return
     with serve(subject, host, port) as url:
         unlisten()

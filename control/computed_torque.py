@@ -47,11 +47,11 @@ class ComputedTorque(Controller):
     d the disturbance that an observer estimates from the momentum: dp/dt = A t + m g + d. Every state gets a
     command: these tensions if they exist (status "as planned"), otherwise those with the closest wrench ("soft
     wrench"). While state or reference contain nan, the last command moves to the planned tensions as fast as the rate
-    permits, and quadrotors finish their turn ("hold"). A wrench error up to 0.1 % of the robot's weight is accepted;
-    with fewer cables than degrees of freedom, 0.1 % along each cable and 10 % in all. Carriers follow the reference, or
-    deviate from it within their `reach` to help the tensions. This damps the swing of loads of towing robots and of
-    teams of quadrotors, with fewer cables than degrees of freedom. Quadrotors have separate loops for position and
-    attitude (core/control/thrusts.c).
+    permits, and quadrotors finish the turn that they have begun ("hold"). A wrench error up to 0.1 % of the robot's
+    weight is accepted; with fewer cables than degrees of freedom, 0.1 % along each cable and 10 % in all. Carriers
+    follow the reference, or deviate from it within their `reach` to help the tensions. This damps the swing of loads of
+    towing robots and of teams of quadrotors, with fewer cables than degrees of freedom. Quadrotors have separate loops
+    for position and attitude (core/control/thrusts.c).
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
@@ -92,8 +92,8 @@ class ComputedTorque(Controller):
         tension_lag, rotor_lag: Known time constants with which winches and actuators of flying carriers follow commands
             [s]. Commands are sent ahead of time, within limits and rates, so that only 5 ms of the first and 15 ms of
             the second remain.
-        sensors: Errors and delay of the sensors, a `simulation.Noise` or a mapping (default: unknown), which is the age
-            of states without a time. The default bandwidths are then the largest that these sensors permit
+        sensors: Errors and delay of the sensors, a `simulation.Noise` or a mapping (default: unknown). The delay is
+            the age of states without a time. The default bandwidths are then the largest that these sensors permit
             (control/bandwidths.py), at most twice those above.
 
     Raises:

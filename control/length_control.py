@@ -39,8 +39,8 @@ class LengthControl(Controller):
 
     where s are the strains at which cables with the stiffness EA and the file's damping have the planned tensions, x is
     the planned pose, J the Jacobian of the lengths, and e the error of the measured pose, whose rotation is a vector in
-    {G}, so that no attitude is special. Winches with a lag get the lengths with which they reach these L0 at the end of
-    the period, as with x; e and its integral are extrapolated over the lag to first order. Tensions of a robot with
+    {G}, so that no attitude is special. Winches with a lag get the lengths with which they reach l(x) / (1 + s) at the
+    end of the period; e and its integral are extrapolated over the lag to first order. Tensions of a robot with
     more cables than degrees of freedom follow from the lengths; they are not controlled. Winches that hold a length for
     a long period move unevenly: `follow` warns if this stretches cables as much as the planned tensions do.
 
@@ -134,7 +134,7 @@ class LengthControl(Controller):
 
     @override
     def follow(self, references: Sequence[Reference], period: float, start: float = 0.0) -> None:
-        """Learn the period; warn if tensions would change by their mean, as winches hold each length for a period."""
+        """Learn the period; warn if it is so long that steps of the lengths would change tensions by their mean."""
         self._period = number("period", period, 1e-6, 1e3)
         lag = max(self._lag, QUICKEST)
         lead, stride = _lead(lag, self._period), 1 + len(references) // SAMPLED

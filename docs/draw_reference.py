@@ -23,7 +23,13 @@ from towline.viewer import read
 
 PICTURES, GALLERY = Path(__file__).parent / "reference" / "pictures", Path(__file__).parent / "pictures"
 # Plans that have a film, and its speed.
-FILMS = {"three_robots_carry": 2, "four_quadrotors_slot": 2, "cogiro_pick_and_place": 2, "fast_tracks_a_source": 15}
+FILMS = {
+    "flying_circle": 3,
+    "three_robots_carry": 2,
+    "four_quadrotors_slot": 2,
+    "cogiro_pick_and_place": 2,
+    "fast_tracks_a_source": 15,
+}
 RATE = 6  # [frames/s]
 WIDTH, COLOURS = 560, 128  # of a small picture: pixels, and shades
 ALMOST_WHITE = 247

@@ -32,5 +32,5 @@ moving = plan(
 )
 print(moving.report())
 moving.save("flying_circle.nc")
-moving.figures()["path"].savefig("flying_circle.png", dpi=150)
+moving.figures()["views"].savefig("flying_circle.png", dpi=150)
 print("saved: flying_circle.nc, flying_circle.png")

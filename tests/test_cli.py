@@ -86,7 +86,7 @@ def test_robots_draws_and_tells_whether_it_can_rest(tmp_path):
 def test_export_writes_models_for_others(tmp_path):
     for option, file in (("--mjcf", "wang-flying.xml"), ("--c", "wang-flying.c")):
         done = run("export", "wang-flying", option, cwd=tmp_path)
-        assert done.stdout.strip() == file
+        assert done.stdout == f"  Written\n    {file}\n"
         assert (tmp_path / file).stat().st_size > 1000
     done = run("export", "wang-flying", code=2)
     assert "export requires exactly one of --mjcf, --c, --step and --fmu" in done.stderr

@@ -96,7 +96,7 @@ def _of_held_out(result: CalibrationData) -> list[str]:
         )
     elif held_out.after > 1.5 * fitted:
         lines.append(
-            f"the residual on training samples is only {_mm(fitted)}: to determine this many parameters, add samples"
+            f"the residual on training samples is only {_mm(fitted)}, so this many parameters require more samples"
         )
     return lines
 

@@ -38,8 +38,8 @@ class PoseEstimate(Displayed):
         ambiguous: True if the search found another pose that may be the true one, (...): it passes the fit test at the
             0.01 % level, even if the cables cannot hold it with the file's CoM and load. Always False with a start.
         by_gravity: True if the lengths alone do not determine the pose, and gravity fixes it, (...).
-        known_covariance: Covariance due to noise that was computed with the pose, (..., 6, 6): of one pose near a
-            start, and of an equilibrium, where it does not follow from the lengths alone.
+        known_covariance: Covariance due to noise, (..., 6, 6), if it was computed together with the pose: for one pose
+            near a start, and for equilibria, because lengths alone do not determine theirs; otherwise None.
         by_parameters: Covariance of equilibria due to the `uncertainty` of the robot file, (..., 6, 6), zero for other
             poses; None without any.
     """
@@ -102,8 +102,8 @@ class PoseEstimate(Displayed):
     def consistent(self) -> Any:
         """Return whether noise of `sigma` and the file's `uncertainty` explain residuals (chi-square test at 1 %).
 
-        With no more cables than coordinates nearly all lengths fit some pose, and the test is meaningless. Lengths with
-        an equilibrium are consistent.
+        With no more cables than coordinates nearly all lengths fit some pose, and the test is meaningless. It is not
+        applied where gravity fixes the pose (`by_gravity`).
         """
         fits = self.cost <= largest_cost(self.robot.m - int(self.robot.dof_mask.sum()))
         return self.converged & (fits | self.by_gravity)

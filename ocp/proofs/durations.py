@@ -45,7 +45,7 @@ class Durations(NamedTuple):
             part = f"first {quantity(100 * self.at, '%', 3)}" if self.at else "start"
             return f"no duration is feasible with the task's time law (proven by the {part} of the motion alone)"
         upper = "" if self.longest == float("inf") else f", at most {quantity(self.longest, 's')}"
-        return f"at least {quantity(self.shortest, 's')}{upper} with the task's time law"
+        return f"tensions require at least {quantity(self.shortest, 's')}{upper} with the task's time law"
 
     def leave(self, low: float, high: float) -> bool:
         """Return whether a duration from `low` to `high` [s] may be possible; doubtful ones may."""

@@ -149,11 +149,12 @@ def _sections(fixed: Loops) -> list[Claim]:
     not_printed, unknown = "The widths of the boxes are not printed. With those of this run", Verdict.NOT_DETERMINED
     fields = {"heights": ", ".join(map(str, SECTIONS)), "not_printed": not_printed}
     claims = []
-    for row, shape, ideal, other in ((0, "a triangle", TRIANGLE, RECTANGLE), (-1, "a rectangle", RECTANGLE, TRIANGLE)):
-        share, height = shares[row], SECTIONS[row]
-        nearer = abs(share - ideal) < abs(share - other)
-        one = claim("figure-4-{height:g}").stated(share, nearer, ideal, unknown, height=height, shape=shape, **fields)
-        claims.append(one)
+    ideals = {"triangle": TRIANGLE, "rectangle": RECTANGLE}
+    for row, shape, other in ((0, "triangle", "rectangle"), (-1, "rectangle", "triangle")):
+        share, ideal = shares[row], ideals[shape]
+        nearer, section = abs(share - ideal) < abs(share - ideals[other]), claim("figure-4-{height:g}")
+        said = {"height": SECTIONS[row], "shape": shape, "other": other, **fields}
+        claims.append(section.stated(share, nearer, ideal, unknown, **said))
     order = claim("figure-4-order").stated(shares, (np.diff(shares) > 0).all(), otherwise=unknown, **fields)
     return [*claims, order, claim("figure-3-shape").undetermined(areas, **fields)]
 
