@@ -142,18 +142,21 @@ def test_a_range_for_a_dwell_that_cannot_be_is_one_line(change, expected):
     assert "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize(("power", "shortest"), [(1, 2.0), (2, 2.0), (1, 0.11), (1.5, 9.9)])
-def test_a_power_of_the_duration_is_found_from_a_few_audits(power, shortest):
-    """Of a speed and an acceleration, which fall with the duration and its square, and of a power between."""
+@pytest.mark.parametrize(("power", "moving"), [(1, 2.0), (2, 2.0), (1, 0.11), (1.5, 9.9)])
+@pytest.mark.parametrize("resting", [0.0, 1.2])
+def test_a_power_of_the_duration_is_found_from_a_few_audits(power, moving, resting):
+    """Of a speed and an acceleration, which fall with the time of moving and its square, and of a power between."""
     tried = []
 
     def beyond(seconds):
         tried.append(seconds)
-        return max((shortest / seconds) ** power - 1, 0.0)
+        return max((moving / (seconds - resting)) ** power - 1, 0.0)
 
-    found = _shortest(PositiveRange(min=0.1, max=10), 0.0, beyond)
+    shortest = resting + moving
+    found = _shortest(PositiveRange(min=0.1, max=1000), resting, beyond)
     assert shortest <= found <= shortest * (1 + 1e-3)
     assert len(tried) <= 5
+    assert max(tried) <= 1.6 * shortest  # the longer the motion, the more its audit takes
 
 
 def test_undefined_values_do_not_end_the_search():

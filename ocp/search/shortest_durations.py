@@ -127,8 +127,9 @@ def _shortest(
     """Return the shortest feasible duration of a range [s], or its longest if that is not feasible either.
 
     It is more than the time `resting` [s] for which the path dwells. `beyond` returns by how much a duration exceeds
-    its limits, as a share of them. Speeds fall with the duration and accelerations with its square, so two excesses
-    show at which duration the limit is kept. No duration but those that are `left` is feasible, if that is known.
+    its limits, as a share of them. Speeds fall with the rest of the duration and accelerations with its square, so two
+    excesses show at which duration the limit is kept. No duration but those that are `left` is feasible, if that is
+    known.
     """
     if left is not None and not left.leave(of.min, of.max):
         return of.max
@@ -136,10 +137,15 @@ def _shortest(
     if not (excess := beyond(low)):
         return low
     power, step = 2.0, CLOSE  # first: where the tensions decide, the shortest is near
-    while excess_there := beyond(high := min(max((1 + excess) ** (1 / power) + CLOSE / 2, 1 + step) * low, of.max)):
+    while True:
+        kept = resting + (1 + excess) ** (1 / power) * (low - resting)
+        high = min(max(kept + CLOSE / 2 * low, (1 + step) * low), of.max)
+        if not (excess_there := beyond(high)):
+            break
         if high == of.max:
             return high
-        power = max(1.0, (math.log1p(excess) - math.log1p(excess_there)) / math.log(high / low))  # also of nan
+        longer = math.log((high - resting) / (low - resting))
+        power = max(1.0, (math.log1p(excess) - math.log1p(excess_there)) / longer)  # also of nan
         low, excess, step = high, excess_there, 4 * step
     middle = high / (1 + CLOSE)
     while high > (1 + CLOSE) * low:
