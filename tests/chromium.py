@@ -14,6 +14,11 @@ PATIENCE = 30_000  # [ms] drawing is in software here
 WEBGL = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 # SwiftShader draws the scene. Drawing the rest of a page with it too takes a third more of a processor.
 PLAIN = ("--disable-gpu-compositing", "--disable-gpu-rasterization")
+# So does drawing each pixel of the scene from four samples, which only smooths edges.
+UNSMOOTHED = """{
+  const { prototype } = HTMLCanvasElement, { getContext } = prototype;
+  prototype.getContext = function (kind, asked) { return getContext.call(this, kind, { ...asked, antialias: false }); };
+}"""
 
 
 @contextlib.contextmanager
@@ -31,6 +36,7 @@ def watched(browser, *own):
     A page costs its process half a second, so the tests of a module share one.
     """
     page, wrong = browser.new_page(viewport={"width": 960, "height": 540}), []  # what is drawn in software is slow
+    page.add_init_script(UNSMOOTHED)
     page.set_default_timeout(PATIENCE)
     page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
     page.on("pageerror", lambda error: wrong.append(str(error)))

@@ -17,7 +17,7 @@ from towline.models import load
 from towline.ocp import plan
 from towline.viewer import read, save_page, serve
 
-from .chromium import PATIENCE, chromium
+from .chromium import PATIENCE, UNSMOOTHED, chromium
 
 FRAMES = int(os.environ.get("TOWLINE_FRAMES", "8"))
 LOAD = 2 if "TOWLINE_FRAMES" in os.environ else 0  # processes that keep processors busy
@@ -77,14 +77,15 @@ def subject(tmp_path_factory):
     return read(str(file))
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def page():
-    """An empty page of a browser, on a busy machine if many frames are looked at."""
+    """A page of a browser, on a busy machine if many frames are looked at."""
     busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(LOAD)]
     try:
         with chromium() as browser:
-            opened = browser.new_page(viewport={"width": 800, "height": 480})
+            opened = browser.new_page(viewport={"width": 400, "height": 240})
             opened.set_default_timeout(max(2 * PATIENCE, 16_000 * FRAMES))
+            opened.add_init_script(UNSMOOTHED)
             opened.add_init_script("window.nativeFrame = requestAnimationFrame.bind(window)")
             yield opened
     finally:
