@@ -2,6 +2,7 @@
 
 import json
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,10 +11,12 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from towline.base.errors import InputError
-from towline.estimation.calibration import Measurements, calibrate
+from towline.estimation.calibration import Measurements, calibrate, stretch
 from towline.estimation.calibration.balance import FeltTensions
 from towline.estimation.calibration.model import Model
 from towline.estimation.calibration.parameters import COMMON, FRAMES, GROUPS, OF_CABLE, Parameters
+from towline.estimation.calibration.solving import solve
+from towline.estimation.calibration.stretch import with_elasticity, with_stretch
 from towline.estimation.logs.load_cells import slack
 from towline.models import Robot, load
 from towline.models.files import as_robot
@@ -236,14 +239,35 @@ def hanging(seed, compliance):
 def test_stretch_of_cables_is_found_by_the_weight_that_hangs_from_them():
     anchors, robot, log = hanging(1, 2e-5)
     found = calibrate(robot, log)
-    stretch = found.parameters[-1]
-    assert stretch.name == "compliance"
-    assert abs(stretch.value - 2e-5) < 3 * stretch.sigma < 1e-5
-    assert [1 / cable.stiffness for cable in found.robot.cables] == pytest.approx([stretch.value] * 3)
+    elastic = found.parameters[-1]
+    assert elastic.name == "compliance"
+    assert abs(elastic.value - 2e-5) < 3 * elastic.sigma < 1e-5
+    assert [1 / cable.stiffness for cable in found.robot.cables] == pytest.approx([elastic.value] * 3)
     assert "cables stretch: E A is" in str(found.report())
     wrong = np.array([cable.anchor for cable in found.robot.cables]) - anchors
     assert np.linalg.norm(wrong, axis=1).max() < 6e-3  # 20 mm and more without stretch
     assert "elasticity" not in calibrate(*hanging(1, 0.0)[1:]).free
+
+
+def test_blocks_of_a_long_log_show_stretch_as_all_samples_do(monkeypatch):
+    """Accelerations of half a metre per second squared would show another stretch where they are ignored."""
+    _, robot, log = hanging(2, 2e-5)
+    solved = solve(robot, log, ("anchors", "offsets"), {}, False)
+    place = solved.model.parameters.clock + COMMON
+    whole = with_stretch(solved).fit.state.x[place]
+    monkeypatch.setattr(stretch, "BLOCKS", 3)
+    monkeypatch.setattr(stretch, "BLOCK", 45)
+    assert with_stretch(solved).fit.state.x[place] == pytest.approx(whole, rel=0.1)
+    assert whole == pytest.approx(2e-5, rel=0.1)
+    stiff = robot.model_copy(
+        update={"cables": tuple(one.model_copy(update={"stiffness": 2e5}) for one in robot.cables)}
+    )
+    for other, rows in ((stiff, log), (robot, hanging(2, 0.0)[2]), (robot, hanging(2, -2e-5)[2])):
+        assert with_stretch(solve(other, rows, ("anchors", "offsets"), {}, False)) is None
+    monkeypatch.setattr(stretch, "turning", lambda *_: SimpleNamespace(enough=True))
+    groups, sigmas = with_elasticity(solved)
+    assert "attachments" in groups
+    assert 0 < sigmas["attachments"] <= 5e-3
 
 
 def test_wrong_requests_are_one_line():

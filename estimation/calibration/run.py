@@ -12,7 +12,7 @@ from .geometry import length_of
 from .parameters import GROUPS, check_free, check_prior
 from .plausibility import mistake
 from .solving import check_enough, solve, usual
-from .stretch import is_elastic, may_stretch, with_elasticity
+from .stretch import is_elastic, with_elasticity, with_stretch
 from .zeros import has_zeros, with_zeros
 
 
@@ -73,9 +73,9 @@ def calibrate(
     if has_zeros(solved):
         groups, priors = with_zeros(given, groups, priors)
         solved = solve(chosen, given, groups, priors, outliers)
-    if may_stretch(solved):
+    if (near := with_stretch(solved)) is not None:
         longer, sigmas = with_elasticity(solved)
-        elastic = solve(chosen, given, longer, sigmas, outliers)
+        elastic = solve(chosen, given, longer, sigmas, outliers, near)
         if is_elastic(elastic):
             groups, priors, solved = longer, sigmas, elastic
     return Calibration(solved, groups, priors, found)

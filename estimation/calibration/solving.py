@@ -23,7 +23,7 @@ from .model import Model, State
 from .normal_equations import metric
 from .observability import Observability
 from .outliers import LEAST_THRESHOLD, SHORTEST, Outlier, Slip, find_outliers, find_slips, find_unbalanced, robust
-from .parameters import IN_BALANCE, Parameters
+from .parameters import IN_BALANCE, OF_ROBOT, Parameters
 from .pose_noise import keeping, observed
 from .projection import out_of_plane
 from .sightings import sighted
@@ -51,6 +51,11 @@ class Solved(NamedTuple):
     slips: tuple[Slip, ...]
     observability: Observability
     clocks: CarrierClocks | None = None
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """Return the values of all parameters but slips."""
+        return self.fit.state.x[: self.model.parameters.clock + OF_ROBOT]
 
 
 class Noise(NamedTuple):
@@ -95,12 +100,24 @@ def is_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ...])
 
 
 def solve(
-    robot: Robot, measurements: Measurements, groups: tuple[str, ...], prior: dict[str, float], outliers: bool
+    robot: Robot,
+    measurements: Measurements,
+    groups: tuple[str, ...],
+    prior: dict[str, float],
+    outliers: bool,
+    near: Solved | None = None,
 ) -> Solved:
-    """Fit, remove outliers and model slips, until there are no more; arguments are checked."""
-    model = model_of(robot, measurements, groups, prior)
+    """Fit, remove outliers and model slips, until there are no more; arguments are checked.
+
+    `near` is a fit of the same log with fewer parameters, from which the fit begins if all poses are known.
+    """
+    begin = None if near is None or near.model.size_is_open else near
+    model = model_of(robot, measurements, groups, prior, near=begin)
     length, taut = length_of(robot), model.weights
-    state = begin_with_clock(model, length) if "clock" in groups else model.begin()
+    if begin is not None:
+        state = model.begin()._replace(x=begin.parameters)
+    else:
+        state = begin_with_clock(model, length) if "clock" in groups else model.begin()
     model = replace(model, ahead=float(state.x[model.parameters.clock]))
     result, used = fit_from(model, state, length, outliers)
     model, fitted = replace(model, kept=used.kept), used.weights
@@ -252,15 +269,19 @@ def model_of(
     prior: dict[str, float],
     track: PoseTrack | None = None,
     weights: np.ndarray | None = None,
+    near: Solved | None = None,
 ) -> Model:
     """Return the model of checked arguments, which starts with level poses where none are measured.
 
     `track` is that of a model with the same poses, which needs as much memory as the log. `weights` are those of
-    `Model`; default: of all readings but those of `left_out`.
+    `Model`; default: of all readings but those of `left_out`. `near` is a fit of the same log: its parameters tell the
+    tensions of a platform that `hangs` better than the file's.
     """
     parameters = Parameters(robot, groups)
+    track = near.model.track if near else track
     weights = ~np.any(list(left_out(robot, measurements).values()), axis=0).T if weights is None else weights
-    model = Model(parameters, measurements, prior, weights, forces=Balance(robot, measurements))
+    forces = (near.model.forces if near else None) or Balance(robot, measurements)
+    model = Model(parameters, measurements, prior, weights, forces=forces)
     if "clock" in groups:
         if track is None:
             position, rotation, _ = measured_poses(robot, measurements)
@@ -274,7 +295,8 @@ def model_of(
         start = level_poses(robot, lengths, "offsets" in groups, measurements.carrier_poses)
         model = replace(model, start=placed(robot, measurements, start))
     elastic = "elasticity" in groups or parameters.compliances(parameters.first).any()
-    felt = carrying(model, model.begin()) if elastic else None
+    begin = model.begin()
+    felt = carrying(model, begin._replace(x=near.parameters) if near else begin) if elastic else None
     return model if felt is None else replace(model, felt=felt)
 
 

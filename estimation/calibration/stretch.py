@@ -1,4 +1,4 @@
-"""`may_stretch` and `is_elastic`: whether cables of unknown stiffness stretch under the weight that hangs from them.
+"""`with_stretch` and `is_elastic`: whether cables of unknown stiffness stretch under the weight that hangs from them.
 
 Weight and inertia determine the tensions where a platform `hangs`. Errors of the attachments, for example, may look
 like cables of different stiffness, so these are taken to be equal, and attachments to be wrong by a few millimetres.
@@ -8,15 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from .balance import hangs
+from .balance import Balance, FeltTensions, hangs
 from .fit import held
 from .geometry import length_of
+from .model import Model, State
 from .normal_equations import NormalEquations, metric
 from .parameters import COMMON, GROUPS
 from .solving import Solved, carrying, covariance_of, noise_of
 from .turning import turning
 
 POSSIBLE, CERTAIN = 3.0, 4.0  # standard deviations of a compliance: of independent errors, and of all
+BLOCKS, BLOCK = 20, 500  # of successive samples of a long log, which show stretch as well as all of them
 ACCURATE, ACCURATELY = 0.005, 0.001  # [m], and share of the cables' length: errors of attachments in files
 
 
@@ -30,21 +32,47 @@ def with_elasticity(solved: Solved) -> tuple[tuple[str, ...], dict[str, float]]:
     return tuple(name for name in GROUPS if name in (*groups, "elasticity")), prior
 
 
-def may_stretch(solved: Solved) -> bool:
-    """Return whether stretch would reduce the residuals of a fit by more than independent errors do by chance.
+def with_stretch(solved: Solved) -> Solved | None:
+    """Return a fit after one step with elasticity, if stretch reduces the residuals more than errors do by chance.
 
-    One step of the fit shows that. False if the file has a stiffness, or weight does not determine the tensions.
+    None also if the file has a stiffness, or weight does not determine the tensions.
     """
     of, state = solved.model, solved.fit.state
     groups, known = of.parameters.groups, of.parameters.compliances(of.parameters.first).any()
     if not groups or "elasticity" in groups or known or not hangs(of.robot, of.measurements):
-        return False
-    model = replace(of, parameters=replace(of.parameters, groups=(*groups, "elasticity")), felt=carrying(of, state))
-    equations = NormalEquations.at(model, state, metric(model))
+        return None
+    of, of_some = _some(of, state)
+    model = replace(of, parameters=replace(of.parameters, groups=(*groups, "elasticity")))
+    equations, varies = NormalEquations.at(model, of_some, scale := metric(model)), model.parameters.varies
     covariance = np.linalg.inv(held(equations.S, length_of(model.robot)))
-    own = np.flatnonzero(model.parameters.varies) == model.parameters.clock + COMMON
+    step, own = -covariance @ equations.b, np.flatnonzero(varies) == model.parameters.clock + COMMON
     excess = max(1.0, float(np.nan_to_num(noise_of(solved).excess)))
-    return bool((-covariance[own] @ equations.b > POSSIBLE * excess * np.sqrt(covariance[own, own])).all())
+    if not (step[own] > POSSIBLE * excess * np.sqrt(covariance[own, own])).all():
+        return None
+    x = state.x.copy()
+    x[varies] += step / scale[varies]
+    return solved._replace(fit=solved.fit._replace(state=state._replace(x=x)))
+
+
+def _some(of: Model, state: State) -> tuple[Model, State]:
+    """Return the model and the state of blocks of samples spread over the log, or all, with the tensions they carry.
+
+    Each block has a motion of its own, as those of all samples together would take as long as a fit.
+    """
+    count, given = len(of.measurements), of.measurements
+    blocks = [np.arange(first, first + BLOCK) for first in np.linspace(0, count - BLOCK, BLOCKS).astype(int)]
+    blocks = [rows for rows in blocks if hangs(of.robot, given.only(rows))] if count > 2 * BLOCKS * BLOCK else []
+    if not blocks:
+        return replace(of, felt=carrying(of, state)), state
+    tensions = []
+    for rows in blocks:
+        part = replace(of.only(rows), forces=Balance(of.robot, given.only(rows)))
+        felt = carrying(part, State(state.x, *(one[rows] for one in state[1:])))
+        assert felt is not None
+        tensions.append(felt.tensions)
+    rows, carried = np.concatenate(blocks), np.concatenate(tensions)
+    felt = FeltTensions(carried, np.zeros((*carried.shape, 0)))
+    return replace(of.only(rows), felt=felt), State(state.x, *(one[rows] for one in state[1:]))
 
 
 def certainty(solved: Solved) -> float:
