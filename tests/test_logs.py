@@ -132,6 +132,7 @@ NAMES = {
         *("x", "pos_y", "position.z", "/mocap/pose.position.x", "field.pose.position.y", "px", "translation.z"),
         *("x_gt", "actual_y", "ground_truth_z", "x_mocap", "tcp_x", "Global Angle:platform/TX"),
         *("position[2]", "PN", "drone1.pos_d", "east", "mocapX", "LocalX", "Mocap/Position(1)"),
+        *("PlatformPosition_1", "stPose.rX", "Northing"),
     ],
     "quaternion": ["qx", "q_w", "quat_z", "/mocap/pose.orientation.w", "rotation.x", "orientation_y", "Mocap/Quat(4)"],
     "angles": ["roll", "Yaw", "/imu/pitch", "roll_gt", "pitch (degrees)", "ry_deg", "EulerX", "rpy[2]", "imu_roll"],
@@ -177,10 +178,14 @@ def test_axes_with_other_names():
         (["Mocap/Position(1)", "Mocap/Position(2)", "Mocap/Position(3)"], ["phi", "theta", "psi"]),
         (["position[0]", "position[1]", "position[2]"], ["rx", "ry", "rz"]),
         (["east", "north", "up"], ["euler_x", "euler_y", "euler_z"]),
+        (["Easting", "Northing", "Height"], ["stPose.rA", "stPose.rB", "stPose.rC"]),
+        ([f"PlatformPosition_{i}" for i in "123"], ["roll", "pitch", "yaw"]),
     ):
         found = fields_of([table([*names, *turned])])
         assert [one.name for one in found.position] == names
         assert [one.name for one in found.orientation] == turned
+    assert [one.name for one in fields_of([table(["lengths:1", "lengths:2"])]).lengths] == ["lengths:1", "lengths:2"]
+    assert not fields_of([table(["l0", "core_pose.c"])]).orientation  # one name of three may mean anything
     assert not fields_of([table(["l0", "u", *(f"position[{i}]" for i in range(8))])]).position
     plane = fields_of([table(["ee_y", "ee_x", "theta"])], free="x z pitch")  # of a planar robot, in another plane
     assert [one.name for one in (*plane.position, *plane.orientation)] == ["ee_x", "ee_y", "theta"]

@@ -20,12 +20,12 @@ from .recording import Recording, Topic, plain
 
 AXES = {"position": ("x", "y", "z"), "quaternion": ("x", "y", "z", "w"), "angles": ("roll", "pitch", "yaw")}
 AXES["thrust_vectors"] = AXES["position"]
-OTHER_AXES = ("012", "ned", "enu")  # of position[0] and PN, for x, y, z
+OTHER_AXES = ("012", "123", "ned", "enu")  # of position[0], PlatformPosition_1 and PN, for x, y, z
 OF_DIRECTION = ("x", "y", "z", "swivel", "azimuth", "elevation")
 TITLE = re.compile(r"(.+?)(?:\s+\[([^\]]*)\])?")
 OF_STRUCTURES = ("x", "y", "z", "w", "roll", "pitch", "yaw")
 MOST_LISTED = 12
-GREEK = re.compile(r"(?i)phi|theta|psi|heading")
+GREEK = re.compile(r"(?i)phi|theta|psi|heading|[./_ ][abc]$")
 OF_PLATFORM = re.compile(r"(?i)(?<![a-z])(platform|payload|end[_ ]?effector|ee|tcp)(?![a-z])")
 BEHIND_NUMBER = re.compile(r"\d[_ ][^\]0-9]+\]$")  # words in the name of a joint
 

@@ -71,10 +71,12 @@ PATTERNS = {
         rf"{_BEFORE}(?:position|translation|pos|point)[./_ ]?([xyz])",
         r"/?[pt]?[_ ]?([xyz])",
         r".*/t([xyz])",
-        rf"{_BEFORE}{_BODY}(?:[./_ ]state)?[./_ ]?(?:pos[_ ]?)?[pt]?([xyz])",
+        rf"{_BEFORE}{_BODY}(?:[./_ ]state)?[./_ ]?(?:pos(?:ition)?[./_ ]?)?[pt]?([xyz])",
         rf"{_BEFORE}(?:position|pos|p)\[(\d)\]",  # of PX4, unless there are more than three
         # PN, PE, PD, as in logs of ArduPilot
-        rf"{_BEFORE}(?:(?:pos[_ ]?|p)(?=[nedu]$)|(?=north|east|down|up))(north|east|down|up|[nedu])",
+        rf"{_BEFORE}{_BODY}[./_ ]?pos(?:ition)?[_ ]?(\d)",  # PlatformPosition_1
+        rf"{_BEFORE}(?:(?:pos[_ ]?|p)(?=[nedu]$)|(?=north|east|down|up|height))"
+        r"((?:north|east)(?:ing)?|down|up|height|[nedu])",
     ),
     "thrusts": (
         rf"{_BEFORE}(?:collective[_ ]?)?(?:thrusts?|throttle|thr|tho){_SENSED}[_ ]?(\d*){_SENSED}",
@@ -148,8 +150,11 @@ ANGLE_OF: dict[str, str] = dict(zip("xyz012abc", 3 * ("roll", "pitch", "yaw"), s
 ANGLE_OF |= {"phi": "roll", "theta": "pitch", "psi": "yaw", "heading": "yaw"}
 
 
-# Names of PLCs begin with a type (fbAxis, arLength), vectors of Simulink count from 1 (Quat(4)), some names are German.
+# Names of PLCs begin with a type (fbAxis, arLength, stPose.rX), vectors of Simulink count from 1 (Quat(4)), some names
+# are German.
 _TYPE = re.compile(r"(?<![A-Za-z])(?:a?(?:fb|st|lr|[finr])|[ag])(?=[A-Z][a-z])")
+_TYPE_OF_AXIS = re.compile(r"(?<=[.\]])(?:lr|[fr])(?=[A-Z]$)")
+_SEPARATOR = re.compile(r"(?<=[A-Za-z]):(?=\d)")  # lengths:1
 _INDEX = re.compile(r"(?<![a-z])(q|quat(?:ernion)?|p|pos(?:ition)?|xyz|rpy|euler|angles?)\((\d+)\)")
 _GERMAN = {"uhrzeit": "time", "zeit": "time", "stempel": "stamp", "winde": "winch", "seil": "cable", "kraft": "force"}
 _GERMAN |= {"länge": "length", "plattform": "platform", "winkel": "", "nick": "pitch", "gier": "yaw"}
@@ -172,7 +177,9 @@ def role(name: str, stated: str = "") -> Role | None:
 
     `stated` is its unit, if there is one beside the name: `rx [deg]` is an angle, and `rx` is of a quaternion.
     """
-    low = _INDEX.sub(lambda found: f"{found[1]}[{int(found[2]) - 1}]", _TYPE.sub("", name).lower().lstrip(". "))
+    untyped, typed = _TYPE.subn("", name)
+    untyped = _SEPARATOR.sub("_", _TYPE_OF_AXIS.sub("", untyped) if typed else untyped)
+    low = _INDEX.sub(lambda found: f"{found[1]}[{int(found[2]) - 1}]", untyped.lower().lstrip(". "))
     for word, english in _GERMAN.items():
         low = low.replace(word, english)
     texts = [(low, "")]
@@ -216,7 +223,7 @@ def _role(which: str, match: re.Match[str], unit: str, name: str) -> Role:
     if which == "angles":
         parts = [ANGLE_OF.get(parts[0], parts[0])]
     if which == "position":
-        parts = [parts[0][0]]  # n of north
+        parts = [parts[0][0].replace("h", "u")]  # n of north, u of height
     if which == "time" and (short := re.search("([mun]|milli|micro|nano)s(ec(ond)?s?)?$", text)):
         unit = unit_of(short[0])
     return Role(which, " ".join(parts), group, unit)
