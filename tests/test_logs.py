@@ -113,7 +113,7 @@ NAMES = {
         "tether_4_length",
         "rho_1",
         *("motor1_pos", "winch_position_2", "Axis1.ActPos", "angle_1", "payout_1", "w1_length"),
-        *("MAIN.fbAxis[1].nIncr", "GVL.fLength1", "Winde 1 Länge"),
+        *("MAIN.fbAxis[1].nIncr", "GVL.fLength1", "Winde 1 Länge", "Winde 1 Laenge"),
     ],
     "tensions": [
         "tension0",

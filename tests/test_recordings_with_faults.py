@@ -12,6 +12,7 @@ from towline.base.errors import InputError
 from towline.estimation.calibration import Measurements, corrected
 from towline.estimation.calibration import left_out as module
 from towline.estimation.calibration.left_out import left_out
+from towline.estimation.calibration.plausibility import mistake
 from towline.estimation.logs.encoders import unrolled
 from towline.models import Dynamics, load
 
@@ -120,6 +121,20 @@ def test_cables_in_another_order_in_a_turned_frame():
     assert "in this order, and the poses seem to be measured in a frame" in texts[0]
     np.testing.assert_array_equal(found.lengths, y)
     assert np.abs(found.poses[:, :3] - poses[:, :3]).max() < 0.1
+
+
+@pytest.mark.parametrize("name", ["cogiro", "caroca"])
+def test_the_reverse_order_of_cables_is_not_taken_for_a_body_upside_down(name):
+    """Both explain the log of a nearly symmetric robot; who recorded it must say which is right."""
+    robot, poses, y = a_log(name, count=60)
+    frame = np.array([1.0, -2.0, 0.3]), Rotation.from_euler("z", 90, degrees=True)
+    found = mistake(robot, Measurements(y[:, ::-1], seen(poses, frame)))
+    assert found.corrected is None
+    assert "those of a body whose frame is" in found.text
+    assert found.text.endswith(
+        "; or the cables look like columns l7, l6, l5, l4, l3, l2, l1, l0 of the log, in this order, "
+        "in other frames that are simpler or fit better"
+    )
 
 
 @pytest.mark.parametrize("taken", [30, 0], ids=["taken up in the middle", "none, but friction of 10 %"])

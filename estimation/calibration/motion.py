@@ -67,9 +67,11 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
     position, rotation, known = measured_poses(robot, measurements)
     quaternions, width = continuous(Rotation.from_matrix(rotation).as_quat()), within(times)
     is_known = known[:, robot.dof_mask > 0].all()
-    if is_known and measurements.tensions is None:
+    # Errors of accelerations would let the mass that they tell appear too small.
+    of_poses = max(width, widest_parabola(times, np.hstack([position, quaternions]))) if is_known else width
+    if measurements.tensions is None:
         # Such tensions stretch cables. Noise of the poses, in them and in lengths, would look like stretch.
-        width = max(width, widest_parabola(times, np.hstack([position, quaternions])))
+        width = of_poses
     of, local = Parameters(robot, ()), Parabolas(times, width)
     lengths = local.fitted(measurements.lengths * of.table(of.first)[:, 7])
     signs = erf(lengths.slopes / np.maximum(np.sqrt(2) * lengths.noise[1], 1e-12))
@@ -80,6 +82,7 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
             carriers = measurements.carrier_poses[..., :3]
             bends += [np.linalg.norm(local.fitted(one).bends, axis=1) for one in np.swapaxes(carriers, 0, 1)]
         return rest._replace(sigma=np.max(bends, axis=0))
+    local = local if of_poses == width else Parabolas(times, of_poses)
     moved, inverse = local.fitted(np.hstack([position, quaternions])), quaternions * [-1, -1, -1, 1]
     rate, spin = (2 * _vector_of_product(part[:, 3:], inverse) for part in (moved.slopes, moved.bends))
     sigma = np.full(count, moved.noise[2, :3].max())

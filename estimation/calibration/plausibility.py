@@ -155,6 +155,11 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
                 text = ", and ".join(filter(None, texts))
                 if rivals:
                     return Mistake(f"{text}; but {counted(rivals, 'other order')} in other frames fit as well", None)
+                if not still and (first == order).all() and len(frames.found) > 1:
+                    better = fitted_orders(given_order)
+                    if not any((one == first[way.columns]).all() for one in better):
+                        other = _and("", better[0], np.ones(robot.m))
+                        return Mistake(f"{text}; or {other}, in other frames that are simpler or fit better", None)
                 corrected = _corrected(given, (*moved, None), first[way.columns], factors, frames.found)
                 return Mistake(text, corrected, factors=factors)
     if named:

@@ -157,7 +157,8 @@ _TYPE_OF_AXIS = re.compile(r"(?<=[.\]])(?:lr|[fr])(?=[A-Z]$)")
 _SEPARATOR = re.compile(r"(?<=[A-Za-z]):(?=\d)")  # lengths:1
 _INDEX = re.compile(r"(?<![a-z])(q|quat(?:ernion)?|p|pos(?:ition)?|xyz|rpy|euler|angles?)\((\d+)\)")
 _GERMAN = {"uhrzeit": "time", "zeit": "time", "stempel": "stamp", "winde": "winch", "seil": "cable", "kraft": "force"}
-_GERMAN |= {"länge": "length", "plattform": "platform", "winkel": "", "nick": "pitch", "gier": "yaw"}
+_GERMAN |= {"länge": "length", "laenge": "length", "plattform": "platform"}
+_GERMAN |= {"winkel": "", "nick": "pitch", "gier": "yaw"}
 
 
 class Role(NamedTuple):
