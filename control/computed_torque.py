@@ -77,9 +77,9 @@ class ComputedTorque(Controller):
             and the damping of their cables make the observer's loop unstable.
         place, attitude: Bandwidths of the position and attitude loops of flying carriers [rad/s]
             (core/control/thrusts.c). Default of `attitude`: 40, or less if the known lags of rotors and sensors require
-            it (control/bandwidths.py); of `place`: 5, but at most a sixth of `attitude`. If carriers turn with so
-            much lag that the attitude loop would be unstable (core/control/turning.c), `attitude` is lowered to the
-            inverse of the lag, `place` and `carrier_bandwidth` by the same factor.
+            it (control/bandwidths.py); of `place`: 5, but at most a sixth of `attitude`. If carriers turn so late that
+            the attitude loop would be unstable, `attitude` is lowered to what the measured lag and delay permit
+            (core/control/turning.c), `place` and `carrier_bandwidth` by the same factor.
         patience: Time for which the sensor of a cable may report no tension, although one is commanded, until the cable
             is treated as cut [s] and the others replace it. The cable then gets its smallest tension, and is used again
             once its sensor reports a tension. Cables of fixed length are never treated as cut. If no sensor reports a
@@ -188,7 +188,7 @@ class ComputedTorque(Controller):
         """Create the memory for one robot, or for each row of a batch."""
         m, count = self.robot.m, len(self.robot.carriers)
         self._time: float | None = None
-        self._elapsed = self._age = 0.0
+        self._elapsed = self._age = self._aged_for = 0.0
         self._carried.reset()
         self._robot = record_of(self.robot)
         self._seen, self._sent_lately = 0.0, LateStates(rows * m)
@@ -322,8 +322,12 @@ class ComputedTorque(Controller):
             self._lead.agree(sender._lead)
 
     def _late_by(self, age: float, dt: float) -> float:
-        """Return the time between steps that delays attitude loops as much as the mean age of states [s]."""
-        self._age += (1.0 if self._time is None else min(dt, 1.0)) * (min(age, OLDEST) - self._age)
+        """Return the time between steps that delays attitude loops as much as the mean age of states [s].
+
+        The mean is that of all states during the first second, because a loop may be unstable with the first ones.
+        """
+        self._aged_for = min(self._aged_for + dt, 1.0)
+        self._age += min(dt / self._aged_for if self._aged_for else 1.0, 1.0) * (min(age, OLDEST) - self._age)
         return ceil(1e3 * self._age - ROUNDING) / 1e3 * PERIOD / DELAY
 
     def _slow_down(self, period: float, late: float) -> None:

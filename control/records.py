@@ -49,10 +49,8 @@ CARRIER = np.dtype(
         ("turn", _TURN),
     ]
 )
-_AXIS = np.dtype([(name, "f8") for name in ("usual", "order", "late_order", "late_rate")])
-TURNING = np.dtype(
-    [("axis", _AXIS, (MOST_CARRIERS, 3)), *((name, "f8") for name in ("along", "square", "lag")), ("has_begun", "i8")]
-)
+_AXIS = np.dtype([*((name, "f8") for name in ("usual", "order")), *((name, "f8", 2) for name in ("late", "rate"))])
+TURNING = np.dtype([("axis", _AXIS, (MOST_CARRIERS, 3)), ("sums", "f8", 5), ("lag", "f8"), ("has_begun", "i8")])
 TETHER = np.dtype(
     [
         *((name, "i4") for name in ("carrier", "cables")),

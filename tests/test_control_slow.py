@@ -180,5 +180,6 @@ def test_attitude_loops_are_slowed_down_for_states_that_are_late():
     robot, controller = load("multi-quadrotor-3"), ComputedTorque(load("multi-quadrotor-3"))
     noise, events = {"delay": 0.04, "stamped": True}, ["push 2 1 0 at 0.2 for 0.2"]
     run = simulate(robot, robot.home, controller, duration=8.0, period=5e-3, noise=noise, events=events)
-    assert run.error[-200:].max() < 0.02 < 0.2 * run.error.max()
+    assert run.error.max() < 0.06  # if the loops are slowed down late, the team is 0.16 m off, and 15 mm at the end
+    assert run.error[-200:].max() < 4e-3
     assert controller._platform["attitude"][0] < 16

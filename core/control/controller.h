@@ -78,17 +78,19 @@ typedef struct {
 
 /* How an axis of a carrier turns: what is ordered, and what is measured; see turning.c. */
 typedef struct {
-    double usual;                 /* rate, in the mean of the last time */
-    double order;                 /* integral of the ordered acceleration, without what it was long ago */
-    double late_order, late_rate; /* x and r */
+    double usual;            /* rate, in the mean of the last time */
+    double order;            /* integral of the ordered acceleration, without what it was long ago */
+    double late[2], rate[2]; /* x and r, after one low-pass filter and after two */
 } towline_turning_axis;
+
+enum { TOWLINE_TURNING_SUMS = 5 };
 
 /* How late the carriers of a robot turn. */
 typedef struct {
     towline_turning_axis axis[TOWLINE_MOST_CARRIERS][3];
-    double along, square; /* means of (x - r) dr/dt and of its square */
-    double lag;           /* of carriers that turn too late, else 0 [s] */
-    int64_t has_begun;    /* 1 after the first step */
+    double sums[TOWLINE_TURNING_SUMS]; /* over recent time, of (x - r) r', (x - r) r'', r' r', r' r'' and r'' r'' */
+    double lag;                        /* of carriers that turn too late, else 0 [s] */
+    int64_t has_begun;                 /* 1 after the first step */
 } towline_turning;
 
 enum { TOWLINE_MOST_TETHERS = 3 };

@@ -269,7 +269,7 @@ double towline_write_thrusts(const towline_robot *robot, const towline_controlle
         towline_measure_lag(robot, controller->attitude, dt, (const double (*)[3])ordered, flight.memory,
                             flight.turning);
         if (flight.turning->lag > 0) {
-            flight.platform->attitude = fmin(flight.platform->attitude, 1 / flight.turning->lag);
+            flight.platform->attitude = fmin(controller->attitude, 1 / flight.turning->lag);
         }
     }
     return lacking;

@@ -1,48 +1,80 @@
 /*
  * How late flying carriers turn after their commanded angular accelerations.
  *
- * With rotors that follow their commands with a lag tau, a critically damped attitude loop of bandwidth h,
+ * Let r be the angular rate and x the integral of the commanded acceleration, both without their slow parts (a
+ * high-pass filter with the time constant 2 / h, h the bandwidth of the attitude loop). A first-order lag tau of rotors
+ * and a delay D of the measurement give, to second order in time,
  *
- *     tau phi''' + phi'' + 2 h phi' + h^2 phi = 0,
+ *     x = r + T dr/dt + C d2r/dt2,     T = tau + D,  C = tau D + D^2 / 2
  *
- * is stable for h tau < 2 (Routh). Let r be the angular rate and x the integral of the commanded acceleration, both
- * without their slow parts (a high-pass filter with the time constant 2 / h). They obey tau dr/dt = x - r. A delay D
- * looks like a lag of at most D. So
+ * so that a critically damped attitude loop, C phi'''' + T phi''' + phi'' + 2 h phi' + h^2 phi = 0, is stable for
  *
- *     tau = <x - r, dr/dt> / <dr/dt, dr/dt>
+ *     h (T + 4 C / T) < 2
  *
- * over all carriers and axes of a robot. A low-pass filter with the time constant 1 / h, applied to x and r first,
- * gives the derivative dr/dt, and removes vibrations.
+ * (Routh): h tau < 2 for a lag alone, h D < 2/3 for a delay alone, where 0.647 is exact. T and C are those of least
+ * squares over all carriers and axes of a robot, and recent time. Low-pass filters with the time constant 1 / h,
+ * applied twice to x and r first, give the derivatives, and remove vibrations.
+ *
+ * An oscillation of frequency w shows a delay as T = sin(w D) / w and C = (1 - cos(w D)) / w^2. So C / T^2 is between
+ * 1/2, of a slow one, and 1 / (1 + cos(w D)) = 0.81 at h D = 0.647, where w = 2.06 h.
+ *
+ * The lag that is returned is the larger one of T and (T + 4 C / T) / 1.5, so that a loop with the inverse of it as its
+ * bandwidth has the margins of control/bandwidths.py: 2 to where a lag makes it unstable, 1.5 or less for a delay.
  */
 #include <string.h>
 
 #include "control/internal.h"
 
-static const double LATE = 1.5;    /* over the bandwidth: a lag of 2 is where the loop gets unstable */
+static const double LATE = 1.5;    /* over the bandwidth: a lag of 2 is where the loop gets unstable, */
+static const double UNSTABLE = 2;  /* over the bandwidth, of T + 4 C / T, of which C is known less well */
+static const double MARGIN = 1.5;  /* of a delay */
+static const double MOST = 0.81;   /* C / T^2 of a delay with which the loop is just unstable */
 static const double WINDOW = 2;    /* over the bandwidth: in which orders and rates are compared */
+static const double MEMORY = 4;    /* windows that count, so that what is small after a turn changes nothing */
 static const double FASTEST = 1e4; /* [rad/s]: nothing turns faster */
-static const double SEEN = 0.01;   /* [rad]: what the lag makes of a carrier's attitude until it is believed */
+static const double SEEN = 0.006;  /* [rad]: what the lag makes of a carrier's attitude until it is believed */
+static const double ALIKE = 1e-3;  /* of the product of their squares: derivatives that cannot be told apart */
 
-/* Update one axis, whose comparison starts again where a number is none, and return dr/dt. */
-static double follow(double bandwidth, double dt, double order, double rate, towline_turning_axis *it) {
-    const double share = 1 - exp(-bandwidth * dt), slow = dt * bandwidth / WINDOW;
+enum { SUMS = TOWLINE_TURNING_SUMS };
+
+/* Add one axis to the sums; its comparison starts again where a number is none. */
+static void follow(double bandwidth, double dt, double order, double rate, towline_turning_axis *it, double *sums) {
+    const double share = 1 - exp(-bandwidth * dt), slow = dt * bandwidth / WINDOW, per = dt > 0 ? share / dt : 0;
     it->order += dt * order - slow * it->order;
     it->usual += slow * (rate - it->usual);
-    const double change = rate - it->usual - it->late_rate;
-    it->late_order += share * (it->order - it->late_order);
-    it->late_rate += share * change;
-    if (!isfinite(it->late_order + it->late_rate)) {
+    const double change = rate - it->usual - it->rate[0], change_of_late = it->rate[0] - it->rate[1];
+    const double before = it->late[1] - it->rate[1];
+    it->late[1] += share * (it->late[0] - it->late[1]);
+    it->rate[1] += share * change_of_late;
+    it->late[0] += share * (it->order - it->late[0]);
+    it->rate[0] += share * change;
+    if (!isfinite(it->late[0] + it->rate[0])) {
         *it = (towline_turning_axis){.usual = rate};
-        return 0;
+        return;
     }
-    return bandwidth * change;
+    const double first = per * change_of_late, second = per * per * (change - change_of_late);
+    const double off = (before + it->late[1] - it->rate[1]) / 2; /* when the derivatives are these */
+    const double products[] = {off * first, off * second, first * first, first * second, second * second};
+    for (int k = 0; k < SUMS; k++) { sums[k] += products[k]; }
+}
+
+/* Return T + 4 C / T of sums, 0 if it is not positive, and write T. */
+static double lateness(const double *sums, double *T) {
+    const double size = sums[2] * sums[4] - sums[3] * sums[3];
+    double C = 0;
+    *T = sums[0] / sums[2];
+    if (size > ALIKE * sums[2] * sums[4]) {
+        *T = (sums[0] * sums[4] - sums[1] * sums[3]) / size;
+        C = (sums[1] * sums[2] - sums[0] * sums[3]) / size;
+    }
+    return *T > 0 ? *T + 4 * fmin(fmax(C / *T, 0), MOST * *T) : 0;
 }
 
 void towline_measure_lag(const towline_robot *robot, double bandwidth, double dt, const double ordered[][3],
                          const towline_carrier_memory *carriers, towline_turning *it) {
     const double window = WINDOW / bandwidth;
     const int again = !it->has_begun || dt > window;
-    double along = 0, square = 0;
+    double now[SUMS] = {0};
     if (again) {
         memset(it, 0, sizeof *it);
         it->has_begun = 1;
@@ -54,16 +86,15 @@ void towline_measure_lag(const towline_robot *robot, double bandwidth, double dt
             if (again) {
                 axis->usual = rate;
             } else {
-                const double change = follow(bandwidth, dt, ordered[c][k], rate, axis);
-                along += (axis->late_order - axis->late_rate) * change;
-                square += change * change;
+                follow(bandwidth, dt, ordered[c][k], rate, axis, now);
             }
         }
     }
-    const double slow = dt / window, late = LATE / bandwidth, rate = SEEN * WINDOW * bandwidth / late;
     if (!again) {
-        it->along += slow * (along - it->along);
-        it->square += slow * (square - it->square);
+        for (int k = 0; k < SUMS; k++) { it->sums[k] += dt / window * (now[k] - it->sums[k] / MEMORY); }
     }
-    it->lag = it->along > late * it->square && it->square > rate * rate ? it->along / it->square : 0;
+    const double rate = SEEN * WINDOW * bandwidth * bandwidth / LATE;
+    double T = 0;
+    const double late = it->sums[2] > rate * rate ? lateness(it->sums, &T) : 0;
+    it->lag = T * bandwidth > LATE || late * bandwidth > UNSTABLE ? fmax(T, late / MARGIN) : 0;
 }
