@@ -134,7 +134,7 @@ class LengthControl(Controller):
 
     @override
     def follow(self, references: Sequence[Reference], period: float, start: float = 0.0) -> None:
-        """Learn the period; warn if steps of lengths, one a period, would change tensions by more than their mean."""
+        """Learn the period; warn if lengths that step once per period change tensions by more than their mean."""
         self._period = number("period", period, 1e-6, 1e3)
         lag = max(self._lag, QUICKEST)
         lead, stride = _lead(lag, self._period), 1 + len(references) // SAMPLED

@@ -61,7 +61,7 @@ class Uncertainty(Part):
 
     @property
     def geometry(self) -> Self | None:
-        """Return the part of anchors, attachments and pulleys; None if only encoders are uncertain."""
+        """Return the uncertainty of anchors, attachments and pulleys alone; None if only encoders are uncertain."""
         kept = [i for i, name in enumerate(self.parameters) if locate(name).part != "encoder"]
         if len(kept) == len(self.parameters):
             return self
@@ -71,17 +71,17 @@ class Uncertainty(Part):
 
     @property
     def matrix(self) -> np.ndarray:
-        """Return the covariance, (p, p) [m^2 of two lengths]."""
+        """Return the covariance, (p, p), in products of the parameters' units, such as [m^2]."""
         return np.array(self.covariance)  # (p, p)
 
     @property
     def sigmas(self) -> np.ndarray:
-        """Return the standard deviations of the parameters, (p,) [m of a length]."""
+        """Return the standard deviations of the parameters, (p,), in their units, such as [m]."""
         return np.sqrt(np.maximum(np.diag(self.matrix), 0.0))  # (p,)
 
     @property
     def factor(self) -> np.ndarray:
-        """Return S with S S^T equal to the covariance, (p, r) [m of a length], r its rank: independent directions."""
+        """Return S with S S^T equal to the covariance, (p, r), in units such as [m]; r is its rank."""
         units = np.where(self.sigmas > 0.0, self.sigmas, 1.0)  # some parameters have other units than others
         eigenvalues, directions = np.linalg.eigh(self.matrix / np.outer(units, units))
         kept = eigenvalues > ROUNDING * max(eigenvalues[-1], 0.0)

@@ -46,7 +46,7 @@ class Replay(Drawn, Reported, Displayed):
     """The result of `replay`.
 
     Attributes:
-        matching: The recording, compared with its plant.
+        matching: The recording and its simulation, compared.
         found (tuple[Explanation, ...]): Share of the residuals that each parameter alone explains, largest first.
         explained: Residuals with the first of these parameters fitted; None if it does not reduce them.
         fitted: Parameters after a fit, or None.

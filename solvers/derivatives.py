@@ -53,7 +53,7 @@ def sensitivity(problem: TensionProblem, solution: TensionSolution) -> Array:
             at once (where pieces meet), or no tensions exist (on the boundary of the available wrench set).
 
     Raises:
-        InputError: If an argument is something else, or the solution has no tensions or those of another number of
+        InputError: If an argument has a wrong type, or the solution has no tensions or those of another number of
             cables.
     """
     tensions = required("solution", solution, TensionSolution).tensions

@@ -61,9 +61,12 @@ def test_a_report_says_if_time_is_not_all_that_costs():
     weighed, fast = (plan(hoist(), {**task, "objective": {"time": time, "jerk": 4.0}}) for time in (1.0, 0.01))
     share = weighed.scenario.duration / weighed.objective
     assert share < 0.9
-    assert f"which has the lowest cost: {100 * share:.0f} % of it is time; for a shorter one, lower" in weighed.report()
+    assert (
+        f"which has the lowest cost, {100 * share:.0f} % of it due to time; for a shorter duration, lower"
+        in weighed.report()
+    )
     assert fast.scenario.duration < 0.9 * weighed.scenario.duration  # as the sentence promises
-    assert "of it is time" not in fast.report()
+    assert "of it due to time" not in fast.report()
 
 
 def test_exact_waypoints_are_passed_though_the_tube_is_used():

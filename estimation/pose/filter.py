@@ -117,7 +117,7 @@ class PoseFilter(Displayed):
             rate: Rate of the measured poses [1/s].
 
         Raises:
-            InputError: If it is no such number.
+            InputError: If the rate is not a number from 1e-3 to 1e6.
         """
         root = np.sqrt(number("rate", rate, 1e-3, 1e6))
         density = np.array([self._sigma["position"], self._sigma["rotation"]]) / root

@@ -82,7 +82,7 @@ class LogPoses(Displayed):
 
     @property
     def largest(self) -> float:
-        """Return the largest `cost` of a sample that a pose fits; nan without redundant cables.
+        """Return the `cost` above which no pose fits a sample; nan without redundant cables.
 
         In a log without wrong readings, the probability that any sample exceeds it is 1 %.
         """

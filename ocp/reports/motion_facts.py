@@ -63,7 +63,7 @@ def _chosen(plan: PlanData) -> str:
     if not 0 < share < NEARLY_ALL:  # a reward for margin makes the whole less than its parts
         return ""
     its = quantity(100 * share, "%", 2)
-    return f", which has the lowest cost: {its} of it is time; for a shorter one, lower `objective.time`"
+    return f", which has the lowest cost, {its} of it due to time; for a shorter duration, lower `objective.time`"
 
 
 def _accuracy(plan: PlanData) -> list[Fact]:

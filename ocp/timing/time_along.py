@@ -66,8 +66,9 @@ def time_along(robot: AnyRobot, task: Task | dict[str, Any] | str | os.PathLike[
 
     Only the geometry of the path matters, not its own time law. Straight legs round their corners by up to `blend`. The
     motion stops at reversals, at dwells and, with `blend: 0`, at corners; the dwell times are part of the duration.
-    A circle ends where its own rate leads within the task's duration or, without a duration, after one turn; for all
-    other paths the task's duration is ignored. Carriers rest or follow given paths with the same parameter s.
+    A circle ends at the point that it reaches at its own rate in the task's duration or, without a duration, after one
+    turn; for all other paths the task's duration is ignored. Carriers rest or follow given paths with the same
+    parameter s.
 
     The task's limits on speeds and accelerations of platform, cables and carriers apply, and so do the robot file's
     limits of winches and of mobile carriers that move. The motors of winches with inertia pull their cables and
