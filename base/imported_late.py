@@ -12,6 +12,7 @@ class _LateModule(ModuleType):
     """A module whose names come from the real one, which is imported with the first of them."""
 
     def __getattr__(self, name: str) -> Any:
+        _end()  # for a module, or another thread, that needs a name while the block runs
         return getattr(import_module(self.__name__), name)
 
 
@@ -23,9 +24,15 @@ def imported_late(package: str, module: str) -> Iterator[None]:
         return
     late = {name: _LateModule(name) for name in (package, f"{package}.{module}")}
     setattr(late[package], module, late[f"{package}.{module}"])
-    sys.modules.update(late)
     try:
+        sys.modules.update(late)
         yield
     finally:
-        for name in late:
-            del sys.modules[name]
+        _end()
+
+
+def _end() -> None:
+    """Let all imports find the real modules again."""
+    for name, module in list(sys.modules.items()):
+        if type(module) is _LateModule:
+            sys.modules.pop(name, None)

@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+from towline.base.imported_late import imported_late
+
 TASK = """\
 name: circle
 path: {kind: circle, centre: [0, 0, -1], radius: 0.5, rate: 0.6}
@@ -27,3 +29,24 @@ def test_a_command_loads_only_what_it_uses(command, tmp_path):
         [sys.executable, "-c", code, *arguments], capture_output=True, text=True, cwd=tmp_path, check=True
     )
     assert not NOT_LOADED[command] & set(done.stderr.split())
+
+
+def test_a_module_that_is_imported_late_is_the_real_one_wherever_it_is_used(tmp_path, monkeypatch):
+    """Its names are also needed at once, as a second thread may, and a module of the package beside it."""
+    package = tmp_path / "heavy_package"
+    package.mkdir()
+    for name in ("__init__", "rare", "other"):
+        (package / f"{name}.py").write_text(f"NAME = {name!r}\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with imported_late("heavy_package", "rare"):
+        import heavy_package.rare as late
+    assert "heavy_package" not in sys.modules
+    with imported_late("heavy_package", "rare"):
+        import heavy_package.rare as now
+        from heavy_package.other import NAME
+    assert (NAME, now.NAME, late.NAME, sys.modules["heavy_package"].NAME) == ("other", "rare", "rare", "__init__")
+    with imported_late("another_package", "rare"):
+        import another_package.rare
+    with pytest.raises(ImportError):
+        another_package.rare.draw()
+    assert not {"another_package", "another_package.rare"} & set(sys.modules)
