@@ -22,6 +22,7 @@ from towline import Robot, Task, load, plan, sweep
 from towline.base.errors import InputError
 from towline.cli.main import app
 from towline.models.parsing import to_yaml
+from towline.models.uncertainty import Uncertainty
 from towline.ocp.sweeps import row as row_module
 from towline.ocp.sweeps.axis import read_axes, read_option
 from towline.ocp.sweeps.cases import Cases
@@ -105,6 +106,21 @@ def test_a_cable_that_is_cut_carries_nothing():
         sweep(three, LIFT, {"robot.cables.t_max": ["cut"]})
     with pytest.raises(InputError, match="must be a mapping with carrier"):
         sweep(three, LIFT, {"robot.cables[0]": ["cut"]})
+
+
+def test_without_a_cable_the_uncertainty_of_the_others_stays_theirs():
+    two = (hoist().cables[0],) * 2
+    known = Uncertainty(
+        parameters=("cables[0].anchor.x", "cables[1].anchor.x", "cables[1].anchor.y"),
+        covariance=((1e-4, 0, 0), (0, 9e-4, 2e-4), (0, 2e-4, 4e-4)),
+    )
+    robot = hoist().model_copy(update={"cables": two, "uncertainty": known})
+    cut = [Cases(robot, Task(**LIFT), read_axes({f"robot.cables[{i}].t_max": ["cut"]})) for i in (0, 1)]
+    left = [cases.case(0)[0].uncertainty for cases in cut]
+    assert left[0].parameters == ("cables[0].anchor.x", "cables[0].anchor.y")
+    np.testing.assert_array_equal(left[0].matrix, [[9e-4, 2e-4], [2e-4, 4e-4]])
+    assert left[1].parameters == ("cables[0].anchor.x",)
+    np.testing.assert_array_equal(left[1].sigmas, [1e-2])
 
 
 def test_whole_robots_and_tasks_vary_and_fields_of_each(folder, monkeypatch):

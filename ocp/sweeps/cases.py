@@ -8,7 +8,9 @@ import numpy as np
 from ...base.errors import InputError
 from ...models import Robot
 from ...models.files import as_robot
+from ...models.parameters import locate
 from ...models.parsing import validate
+from ...models.uncertainty import Uncertainty
 from ..tasks.lay_out import lay_out
 from ..tasks.task import Task, read_task
 from .axis import Axis
@@ -22,6 +24,22 @@ def _data_of(task: Task) -> dict[str, Any]:
     for key, own in (("limits", task.limits.own), ("objective", task.objective.own)):
         if own:
             data.setdefault(key, {})["own"] = own
+    return data
+
+
+def _without_cut_cables(data: dict[str, Any], name: str) -> dict[str, Any]:
+    """Return the data of a robot without the cables that are cut; its uncertainty names the others by new numbers."""
+    kept = [i for i, one in enumerate(data["cables"]) if not (isinstance(one, dict) and one.get("t_max") == CUT)]
+    data = {**data, "cables": [data["cables"][i] for i in kept]}
+    if data.get("uncertainty") is None:
+        return data
+    known, numbers = validate(data["uncertainty"], Uncertainty, f"robot {name!r}: uncertainty"), {}
+    for row, parameter in enumerate(known.parameters):
+        if (cable := locate(parameter).cable) in kept:
+            numbers[row] = parameter.replace(f"[{cable}]", f"[{kept.index(cable)}]")
+    rows = list(numbers)
+    covariance = known.matrix[np.ix_(rows, rows)].tolist()
+    data["uncertainty"] = {"parameters": list(numbers.values()), "covariance": covariance} if rows else None
     return data
 
 
@@ -87,9 +105,7 @@ class Cases:
             for axis, index in parts:
                 data = axis.field.set(data, axis.values[index])
             if any(axis.values[index] == CUT for axis, index in parts):  # last, since the numbers of the others change
-                data["cables"] = [
-                    each for each in data["cables"] if not (isinstance(each, dict) and each.get("t_max") == CUT)
-                ]
+                data = _without_cut_cables(data, robot.name)
             self._robots[place] = validate(data, Robot, f"robot {robot.name!r}")
         return self._robots[place] if parts else robot
 
