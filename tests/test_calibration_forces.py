@@ -255,6 +255,13 @@ def test_stretch_of_cables_is_found_by_the_weight_that_hangs_from_them():
     wrong = np.array([cable.anchor for cable in found.robot.cables]) - anchors
     assert np.linalg.norm(wrong, axis=1).max() < 6e-3  # 20 mm and more without stretch
     assert "elasticity" not in calibrate(*hanging(1, 0.0)[1:]).free
+    stiff = robot.model_copy(
+        update={"cables": tuple(one.model_copy(update={"stiffness": 1e5}) for one in robot.cables)}
+    )
+    more = calibrate(stiff, log, ("anchors", "offsets", "elasticity"))
+    by_both = 1 / more.robot.cables[0].stiffness
+    assert abs(by_both - 2e-5) < 3 * more.parameters[-1].sigma
+    assert f"1 / (E A) is {1e6 * by_both - 10:.2f} 1/MN more, +-" in str(more.report())
 
 
 def test_blocks_of_a_long_log_show_stretch_as_all_samples_do(monkeypatch):

@@ -140,8 +140,10 @@ def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[st
         # Errors of the poses' velocities let a clock offset seem certain where the lengths hardly change.
         always = frames
     forces = _forces(solved, (*first, *always))
-    elastic = ["stiffness"] if measurements.tensions is not None else ["elasticity"] * hangs(robot, measurements)
-    sets += [(*one, *elastic) for one in sets if elastic and "offsets" in one]
+    if measurements.tensions is not None:
+        sets += [(*one, "stiffness") for one in sets if "offsets" in one]
+    elif hangs(robot, measurements):
+        sets += [(*one, "elasticity") for one in sets if "offsets" in one]
     best = _compare(solved, [(*one, *always, *forces) if one else one for one in sets], {}).best
     for word in forces if best else ():
         without = tuple(name for name in best if name != word)

@@ -113,12 +113,17 @@ def _of_noise(result: CalibrationData) -> list[str]:
         lines.append("the model is incomplete: --free auto also tries scales, attachments and more")
     stretch = next((one for one in result.parameters if one.name == "compliance"), None)
     if stretch is not None and 0 < stretch.sigma < stretch.value:
-        lines.append(
-            f"cables stretch: E A is {quantity(1e-3 / stretch.value, 'kN', 3)}, +- "
-            f"{quantity(100 * stretch.sigma / stretch.value, digits=2)} %, if it is the same for all cables"
-            + " and the platform has the file's mass"
-            * (result.measurements.tensions is None)
-        )
+        share = quantity(100 * stretch.sigma / stretch.value, digits=2)
+        by_weight = " and the platform has the file's mass" if result.measurements.tensions is None else ""
+        if "stiffness" in result.free or any(cable.stiffness for cable in result.file.cables):
+            more = quantity(1e6 * stretch.value, "1/MN", 3)
+            lines.append(
+                f"cables stretch more than by their own stiffness: 1 / (E A) is {more} more, +- {share} %, "
+                f"if it is as much more for all cables{by_weight}"
+            )
+        else:
+            size = quantity(1e-3 / stretch.value, "kN", 3)
+            lines.append(f"cables stretch: E A is {size}, +- {share} %, if it is the same for all cables{by_weight}")
     for frame, end in ((one, ENDS[one]) for one in ENDS if one in result.free):
         size = f"wrong by {_mm(result.prior[end])}" if end in result.prior else "exact"
         what = "the frame of the poses" if frame == "frame" else "the measured body"

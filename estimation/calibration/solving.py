@@ -320,8 +320,8 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
     if framed and not measured(measurements).any():
         raise InputError(f"measurements.poses must be given to estimate {', '.join(framed)}, got none")
     of_forces = [name for name in groups if name in (*IN_BALANCE, "stiffness", "elasticity")]
-    known = ["elasticity"] * hangs(robot, measurements) + ["com"]
-    if measurements.tensions is None and not set(of_forces) <= set(known):
+    known = {"com", "elasticity"} if hangs(robot, measurements) else {"com"}
+    if measurements.tensions is None and not set(of_forces) <= known:
         flies = any(carrier.actuators for carrier in robot.carriers)
         hint = " (or thrusts, attitudes and times of the carriers in a log)" if flies else ""
         raise InputError(f"measurements.tensions must be given to estimate {', '.join(of_forces)}{hint}, got none")
