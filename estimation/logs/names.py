@@ -73,8 +73,8 @@ PATTERNS = {
         r".*/t([xyz])",
         rf"{_BEFORE}{_BODY}(?:[./_ ]state)?[./_ ]?(?:pos(?:ition)?[./_ ]?)?[pt]?([xyz])",
         rf"{_BEFORE}(?:position|pos|p)\[(\d)\]",  # of PX4, unless there are more than three
-        # PN, PE, PD, as in logs of ArduPilot
         rf"{_BEFORE}{_BODY}[./_ ]?pos(?:ition)?[_ ]?(\d)",  # PlatformPosition_1
+        # PN, PE, PD, as in logs of ArduPilot
         rf"{_BEFORE}(?:(?:pos[_ ]?|p)(?=[nedu]$)|(?=north|east|down|up|height))"
         r"((?:north|east)(?:ing)?|down|up|height|[nedu])",
     ),
