@@ -154,6 +154,11 @@ class Balance:
         return poses if poses.ndim == 2 else np.ascontiguousarray(poses[self._chosen])
 
     @property
+    def motion_is_known(self) -> bool:
+        """Return whether poses show how the platform accelerates, or it is at rest."""
+        return self._log.motion.is_known
+
+    @property
     def at_rest(self) -> bool:
         """Return whether the platform is taken to be at rest in all samples."""
         return not self._log.motion.sigma.any()

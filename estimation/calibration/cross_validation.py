@@ -142,7 +142,7 @@ def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[st
     forces = _forces(solved, (*first, *always))
     if measurements.tensions is not None:
         sets += [(*one, "stiffness") for one in sets if "offsets" in one]
-    elif hangs(robot, measurements):
+    elif hangs(robot, measurements) and solved.model.forces is not None and solved.model.forces.motion_is_known:
         sets += [(*one, "elasticity") for one in sets if "offsets" in one]
     best = _compare(solved, [(*one, *always, *forces) if one else one for one in sets], {}).best
     for word in forces if best else ():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -25,6 +25,7 @@ class Motion(NamedTuple):
         turning: Rate of the angular momentum about the CoM in {G}, (N, 3) [N m].
         sigma: Standard deviation of the acceleration, 0 where the platform rests, (N,) [m/s^2].
         smooth: Smoothing of values (N, d) by the same parabolas, None without times.
+        is_known: Whether the poses show how the platform accelerates, or it is at rest.
     """
 
     signs: np.ndarray
@@ -34,13 +35,14 @@ class Motion(NamedTuple):
     turning: np.ndarray
     sigma: np.ndarray
     smooth: Parabolas | None = None
+    is_known: bool = True
 
     def ahead(self, times: np.ndarray | None, clock: float, rows: np.ndarray | slice) -> Motion:
         """Return the motion at some samples, with that of the platform `clock` [s] later; its ends stay as they are.
 
         `times` (N,) [s] are those of all samples.
         """
-        moved: dict[str, np.ndarray] = {}
+        moved: dict[str, Any] = {}
         for name in ("gravity", "rate", "spin", "turning"):
             values = getattr(self, name)
             if times is None or clock == 0.0:
@@ -65,8 +67,12 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
     from scipy.special import erf
 
     position, rotation, known = measured_poses(robot, measurements)
-    quaternions, width = continuous(Rotation.from_matrix(rotation).as_quat()), within(times)
-    is_known = known[:, robot.dof_mask > 0].all()
+    quaternions, width = Rotation.from_matrix(rotation).as_quat(), within(times)
+    known = np.asarray(known[:, robot.dof_mask > 0].all(axis=1))  # (N,)
+    is_known = bool(known[[0, -1]].all()) and np.diff(np.flatnonzero(known)).max() <= width // 2 + 1
+    if is_known:
+        position, quaternions = (_filled(times, one, known) for one in (position, quaternions))
+        rotation = Rotation.from_quat(quaternions).as_matrix()
     # Errors of accelerations would let the mass that they tell appear too small.
     of_poses = max(width, widest_parabola(times, np.hstack([position, quaternions]))) if is_known else width
     if measurements.tensions is None:
@@ -81,7 +87,7 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
         if measurements.carrier_poses is not None:  # a load follows its carriers, also on cables of fixed length
             carriers = measurements.carrier_poses[..., :3]
             bends += [np.linalg.norm(local.fitted(one).bends, axis=1) for one in np.swapaxes(carriers, 0, 1)]
-        return rest._replace(sigma=np.max(bends, axis=0))
+        return rest._replace(sigma=np.max(bends, axis=0), is_known=False)
     local = local if of_poses == width else Parabolas(times, of_poses)
     moved, inverse = local.fitted(np.hstack([position, quaternions])), quaternions * [-1, -1, -1, 1]
     rate, spin = (2 * _vector_of_product(part[:, 3:], inverse) for part in (moved.slopes, moved.bends))
@@ -91,6 +97,14 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
         momentum, change = (np.einsum("nij,nj->ni", inertia, part) for part in (rate, spin))
         rest = rest._replace(turning=change + np.cross(rate, momentum))
     return rest._replace(gravity=gravity - moved.bends[:, :3], rate=rate, spin=spin, sigma=sigma)
+
+
+def _filled(times: np.ndarray, values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Return values (N, d), quaternions of one sign, with those of samples without a pose between their neighbours."""
+    from scipy.interpolate import CubicSpline
+
+    seen = continuous(values[known]) if values.shape[1] == 4 else values[known]
+    return seen if known.all() else np.asarray(CubicSpline(times[known], seen)(times))
 
 
 def _vector_of_product(p: np.ndarray, q: np.ndarray) -> np.ndarray:

@@ -35,11 +35,13 @@ def with_elasticity(solved: Solved) -> tuple[tuple[str, ...], dict[str, float]]:
 def with_stretch(solved: Solved) -> Solved | None:
     """Return a fit after one step with elasticity, if stretch reduces the residuals more than errors do by chance.
 
-    None also if the file has a stiffness, or weight does not determine the tensions.
+    None also if the file has a stiffness, or weight does not determine the tensions, or accelerations are unknown.
     """
     of, state = solved.model, solved.fit.state
     groups, known = of.parameters.groups, of.parameters.compliances(of.parameters.first).any()
     if not groups or "elasticity" in groups or known or not hangs(of.robot, of.measurements):
+        return None
+    if of.forces is None or not of.forces.motion_is_known:  # which takes longer to know
         return None
     of, of_some = _some(of, state)
     model = replace(of, parameters=replace(of.parameters, groups=(*groups, "elasticity")))
