@@ -127,7 +127,7 @@ PUSH = np.array([0.04, 0.02, 0, 0, 0, 0])  # of the weight
 
 
 @pytest.mark.parametrize("name", TEAMS)
-@pytest.mark.parametrize("late", [{"rate": 20}, {"delay": 0.025}])
+@pytest.mark.parametrize("late", [{"rate": 20}, {"delay": 0.05}])
 def test_carriers_that_oscillate_at_their_limits_are_reported_before_the_load_is_away(name, late):
     """By states that are late or held without a time: h delay > 0.647, h period > 1."""
     robot = load(name)
@@ -137,6 +137,19 @@ def test_carriers_that_oscillate_at_their_limits_are_reported_before_the_load_is
     assert run.error[: reported[0] + 1].max() < 0.025
     within = run.record.answered[reported[0] : run.lasted] != PLANNED
     assert within.mean() > 0.9
+
+
+@pytest.mark.parametrize("name", TEAMS)
+def test_attitude_loops_are_slowed_down_for_an_unknown_delay_before_they_oscillate(name):
+    """For 25 ms the usual bandwidth of 40 rad/s would be unstable, and carriers would soon be at their limits."""
+    robot = load(name)
+    push = PUSH * robot.weight
+    late, on_time = (
+        simulate(robot, robot.home, noise={"delay": delay}, disturbance=push, duration=1.0) for delay in (0.025, 0.0)
+    )
+    assert (late.record.answered == PLANNED).all()
+    assert late.error.max() < 2 * on_time.error.max()
+    assert np.abs(late.record.motions[-200:, 1:, 9:]).max() < 0.2  # [rad/s]; at the limits it is 6
 
 
 @pytest.mark.parametrize("name", TEAMS)
