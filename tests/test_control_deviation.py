@@ -127,16 +127,19 @@ PUSH = np.array([0.04, 0.02, 0, 0, 0, 0])  # of the weight
 
 
 @pytest.mark.parametrize("name", TEAMS)
-@pytest.mark.parametrize("late", [{"rate": 20}, {"delay": 0.05}])
-def test_carriers_that_oscillate_at_their_limits_are_reported_before_the_load_is_away(name, late):
-    """By states that are late or held without a time: h delay > 0.647, h period > 1."""
+@pytest.mark.parametrize(("late", "share"), [({"rate": 20}, 0.9), ({"delay": 0.05}, 0.5)])
+def test_carriers_that_oscillate_at_their_limits_are_reported_before_the_load_is_away(name, late, share):
+    """By states that are late or held without a time: h delay > 0.647, h period > 1.
+
+    For the delay the attitude loops are then slowed down, so that carriers are at their limits for a part of the time.
+    """
     robot = load(name)
     run = simulate(robot, robot.home, noise=late, disturbance=PUSH * robot.weight, duration=0.6)
     reported = np.flatnonzero(run.record.answered[: run.lasted] != PLANNED)
     assert reported.size
     assert run.error[: reported[0] + 1].max() < 0.025
     within = run.record.answered[reported[0] : run.lasted] != PLANNED
-    assert within.mean() > 0.9
+    assert within.mean() > share
 
 
 @pytest.mark.parametrize("name", TEAMS)
