@@ -198,10 +198,10 @@ class Search:
         return outcome
 
     def approach(self, mesh: Mesh, guess: Deviation | None, scenario: Scenario | None = None) -> Outcome | None:
-        """Return a motion past the regions that are in the way, from which the program of `mesh` soon ends, or None.
+        """Return the outcome of passes with linear distances: a motion past the regions that are in the way, or None.
 
-        It results from passes with linear distances, each about the motion of the one before. The motion is one of
-        `scenario`; default: of the search's own.
+        Each pass is about the motion of the one before. The program of `mesh` soon ends from the last motion. It is one
+        of `scenario`; default: of the search's own.
         """
         slower = "" if scenario is None else f", motion of {quantity(scenario.duration, 's')}"
         scenario = scenario or self.scenario
