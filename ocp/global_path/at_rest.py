@@ -122,7 +122,7 @@ class AtRest:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the tensions nearest to others (m,) that balance w, cut to their limits, (n, m), and what they miss.
 
-        Those nearest to the middle of the limits are often inside them where those of least norm are not.
+        Tensions nearest to the middle of the limits are often inside them where tensions of least norm are not.
 
         Source: Pott, Bruckmann and Mikelsons, Closed-form force distribution for parallel wire robots, 2009.
         """
