@@ -261,6 +261,8 @@ def test_stretch_of_cables_is_found_by_the_weight_that_hangs_from_them():
         again = calibrate(robot, log.changed(poses=poses))
         assert ("elasticity" in again.free) == is_found
         assert not is_found or abs(again.parameters[-1].value - 2e-5) < 3 * elastic.sigma
+    with pytest.raises(InputError, match=r"known throughout a motion to estimate elasticity .* 280 of 300"):
+        calibrate(robot, again.measurements, free=("anchors", "offsets", "elasticity"))
     stiff = robot.model_copy(
         update={"cables": tuple(one.model_copy(update={"stiffness": 1e5}) for one in robot.cables)}
     )

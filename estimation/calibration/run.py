@@ -2,9 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 
+from ...base.errors import InputError
 from ...base.inputs import flag
 from ...models.files import AnyRobot, as_robot
-from ..logs.measurements import Measurements, check_measurements
+from ..logs.measurements import Measurements, check_measurements, tracked
 from .calibration import Calibration
 from .cross_validation import select
 from .file_errors import errors_of_file, loose
@@ -67,6 +68,12 @@ def calibrate(
         check_enough(chosen, given, groups, priors)
     first = loose(length_of(chosen), groups, priors)
     solved = solve(chosen, given, groups, first, outliers)
+    forces = solved.model.forces
+    if "elasticity" in groups and given.tensions is None and forces is not None and not forces.motion_is_known:
+        raise InputError(
+            "measurements.poses must be known throughout a motion to estimate elasticity without tensions, got "
+            f"{int(tracked(chosen, given).sum())} of {len(given)}: longer gaps and open ends hide accelerations"
+        )
     if first != priors:
         priors = errors_of_file(solved, priors)
         solved = solve(chosen, given, groups, priors, outliers)
