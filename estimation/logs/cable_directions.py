@@ -17,7 +17,7 @@ from ...models import points
 from ...models.dynamics import Dynamics
 from ...models.robot import Robot
 from .encoders import lengths_of
-from .mapping import Field
+from .field import Field
 from .measurements import Measurements, carriers_of, measured_poses
 
 FRAMES = {"world": "in {G}", "carrier": "in the frames of the carriers", "platform": "in the frame of the platform"}

@@ -8,7 +8,8 @@ from ...base.errors import InputError
 from ...base.text import quantity
 from ...models import points
 from ...models.robot import Robot
-from .mapping import Field, Fields, LogMap, carrier_fields, command_fields
+from .field import Field
+from .mapping import Fields, LogMap, carrier_fields, command_fields
 from .measurements import Measurements
 from .recording import Recording, Samples
 from .smoothing import FEWEST, Parabolas, continuous, within

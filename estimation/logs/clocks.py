@@ -14,7 +14,8 @@ from .alignment import Clock, ClockJumpError, align, check_jumps
 from .cable_directions import vectors
 from .carrier_poses import angles_at, carriers_at
 from .encoders import locked
-from .mapping import Field, LogMap, carrier_fields
+from .field import Field
+from .mapping import LogMap, carrier_fields
 from .measurements import Measurements, measured_poses, tracked
 from .north_east_down import from_ned, ned_frame, platform_from_ned
 from .pose_track import PoseTrack, unit_quaternions

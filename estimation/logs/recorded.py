@@ -16,8 +16,9 @@ from ..calibration.plausibility import mistake
 from ..pose.from_log import poses_from_log
 from .carrier_poses import carriers_at, filled
 from .encoders import lengths_of
+from .field import Field
 from .load_cells import unreadable
-from .mapping import Field, command_fields, read_map
+from .mapping import command_fields, read_map
 from .north_east_down import carriers_from_ned, ned_frame, note_of, platform_from_ned
 from .reading import Log, Paths, read_log
 from .streams import Reader

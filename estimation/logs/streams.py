@@ -7,7 +7,8 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.text import quantity
 from ...models.part import LARGEST
-from .mapping import Field, Fields
+from .field import Field
+from .mapping import Fields
 from .names import UNITS, dated_unit, time_unit
 from .recording import GAP, Samples, Topic, check_rising, plain
 
