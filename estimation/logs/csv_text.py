@@ -91,40 +91,57 @@ def _with_points(text: str) -> str:
 def _one_header(text: str) -> str:
     """Return CSV with one line of names: motion capture systems write several, and others one of units below names.
 
-    Names that are commented out, as those of `numpy.savetxt`, are names if no others are above the numbers.
+    Raises:
+        InputError: If there are numbers without a line above them.
     """
     lines = _head(text)
     mark = max(",;\t", key="".join(lines).count)
     table = [[cell.strip().strip('"') for cell in line.split(mark)] for line in lines]
-    first = next((k for k, row in enumerate(table) if _is_data(row, table[k + 1] if k + 1 < len(table) else row)), 0)
-    width, ends = len(table[first]), [k + 1 for k in range(first) if lines[k].startswith(LABVIEW)]
-    begin = max(ends, default=0)
-    if len(table[first - 1]) == width - 1 and not table[first][-1]:
-        table[first - 1].append("")
-    above = [(_cut(row, width), line) for row, line in zip(table[begin:first], lines[begin:], strict=False)]
-    above = [(row, line) for row, line in above if len(row) == width]
-    # The title of a sheet is alone in the first of its columns; bodies of OptiTrack have numbers beside their names.
-    rows = [row for row, line in above if line[:1] != "#" and (len(row) < 2 or any(row[1:])) and row[1:2] != ["ID"]]
-    commented = not rows and bool(above)
-    if commented:
-        rows = [[cell.lstrip("# ") for cell in above[-1][0]]]
-    if not above and _is_data(table[first], table[first]) and all(line[:1] in ("", "#") for line in lines[:first]):
-        raise InputError(f"must have a header that names its columns, as in {HEADER}, got numbers in its first line")
-    plain = all(not line.strip() or line[:1] == "#" for line in lines[: first - 1])
-    if not rows or (len(rows) == 1 and plain and not commented and len(table[first - 1]) == width):
+    below = [*table[1:], table[-1]]
+    first = next((k for k, rows in enumerate(zip(table, below, strict=True)) if _is_data(*rows)), 0)  # of numbers
+    last = table[first - 1] if first else []
+    if any(last) and len(last) == len(table[first]) - 1 and not table[first][-1]:
+        last.append("")  # only the numbers end with a separator
+    rows = _rows_of_names(lines[:first], table[:first], len(table[first]))
+    if rows is None:
+        if _is_data(table[first], table[first]) and all(line[:1] in ("", "#") for line in lines[:first]):
+            stated = "got numbers in its first line"
+            raise InputError(f"must have a header that names its columns, as in {HEADER}, {stated}")
+        return text
+    plain = len(rows) == 1 and len(last) == len(table[first]) and lines[first - 1][:1] != "#"
+    if plain and all(not line.strip() or line[:1] == "#" for line in lines[: first - 1]):
         return text
     head = "\n".join(lines[:first])
     names, units = _of_scope(rows) if any(row[0] == "Name" for row in rows) else _of_rows(rows, head)
     # Where each channel has times of its own, their columns have one name.
     names = [f"{names[0]} of {names[k + 1]}" if k and name == names[0] else name for k, name in enumerate(names)]
     titles = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True)]
-    below = text.split("\n", first)[-1] if "\n" in text else ""
-    return "\n" * (first - 1) + mark.join(titles) + "\n" + below  # empty lines keep the numbers of lines
+    numbers = text.split("\n", first)[-1] if "\n" in text else ""
+    return "\n" * (first - 1) + mark.join(titles) + "\n" + numbers  # empty lines keep the numbers of lines
+
+
+def _rows_of_names(lines: list[str], table: list[list[str]], width: int) -> list[list[str]] | None:
+    """Return the rows of names above the numbers, of which each has `width` columns; None if no row has so many.
+
+    Names that are commented out, as those of `numpy.savetxt`, are names if no others are above the numbers.
+    """
+    begin = max((k + 1 for k, line in enumerate(lines) if line.startswith(LABVIEW)), default=0)
+    above = [(_cut(row, width), line[:1] == "#") for row, line in zip(table[begin:], lines[begin:], strict=True)]
+    above = [(row, commented) for row, commented in above if len(row) == width]
+    if not above:
+        return None
+    rows = [row for row, commented in above if not (commented or _is_title(row))]
+    return rows or [[cell.lstrip("# ") for cell in above[-1][0]]]
 
 
 def _cut(row: list[str], width: int) -> list[str]:
     """Return a row of names without a last cell, empty or for comments (LabVIEW), that rows of numbers leave out."""
     return row[:width] if row[width:] in ([""], ["Comment"]) else row
+
+
+def _is_title(row: list[str]) -> bool:
+    """Return whether a row is empty, has a title alone in its first cell, or the numbers of bodies (OptiTrack)."""
+    return not any(row[1:] or row) or row[1:2] == ["ID"]
 
 
 def _of_rows(rows: Sequence[list[str]], head: str) -> tuple[list[str], list[str]]:
