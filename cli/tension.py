@@ -9,6 +9,8 @@ import typer
 from .options import CarrierPoseOption, JsonOption, RobotArgument, numbers, parameters, print_json, print_table
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from ..models import Robot
     from ..solvers import TensionProblem, TensionSolution
 
@@ -64,8 +66,19 @@ def tension(
         print_json({"robot": loaded.name, **at, **solution.to_dict(), "methods": each})
     else:
         _show(loaded, at, solutions, method)
+        _show_slipped_units(loaded, place, air)
     if not solution.feasible:
         raise typer.Exit(1)
+
+
+def _show_slipped_units(robot: Robot, pose: np.ndarray, wind: np.ndarray | None) -> None:
+    """Print a line for each unit in which numbers of the pose, the wind or the robot seem to be instead."""
+    from ..ocp.tasks.task import Task
+    from ..ocp.warnings.slipped_units import slipped_units
+
+    task = {"path": {"kind": "rest", "pose": pose.tolist()}, "wind": None if wind is None else wind.tolist()}
+    for sentence in slipped_units(robot, Task.model_validate(task)):
+        typer.echo(sentence.replace("path.pose", "--pose"))
 
 
 def _solve(problem: TensionProblem, method: str, backend: str | None = None) -> TensionSolution:
