@@ -38,7 +38,7 @@ PLATFORM = np.dtype(
         ("silent", "i8"),
     ]
 )
-_TURN = np.dtype([("steady", "f8", 6), ("away", "f8", 3), ("rate", "f8", 3)])
+_TURN = np.dtype([("steady", "f8", 6), *((name, "f8", 3) for name in ("bent", "away", "rate"))])
 CARRIER = np.dtype(
     [
         *((name, "f8", 6) for name in ("offset", "offset_rate")),
@@ -49,7 +49,9 @@ CARRIER = np.dtype(
         ("turn", _TURN),
     ]
 )
-_AXIS = np.dtype([*((name, "f8") for name in ("usual", "order")), *((name, "f8", 2) for name in ("late", "rate"))])
+_AXIS = np.dtype(
+    [*((name, "f8") for name in ("usual", "order")), *((name, "f8", 2) for name in ("late", "rate", "unseen"))]
+)
 TURNING = np.dtype([("axis", _AXIS, (MOST_CARRIERS, 3)), ("sums", "f8", 5), ("lag", "f8"), ("has_begun", "i8")])
 TETHER = np.dtype(
     [

@@ -59,6 +59,7 @@ typedef struct {
 /* How a carrier turns, in its own axes: measured, or predicted while no state is measured. */
 typedef struct {
     double steady[6]; /* force [N], and moment [N m] with which it turns as its reference does */
+    double bent[3];   /* angular acceleration of its reference [rad/s^2] */
     double away[3];   /* e of thrusts.c [rad] */
     double rate[3];   /* rate of change of e [rad/s] */
 } towline_turn;
@@ -69,7 +70,7 @@ typedef struct {
     double force[3];                  /* estimated: what acts beside thrust, cables and weight, in {G} [N] */
     double explained[3];              /* momentum less what the estimate explains */
     double ordered[3];                /* angular acceleration within the actuators' limits, in its own axes */
-    double turning[3];                /* rate that is measured, in its own axes */
+    double turning[3];                /* rate that is measured, in its own axes; nan while none is */
     double lacking;                   /* thrust that its actuators do not give, or give too much, by their limits [N] */
     double wanted[TOWLINE_MOST_ACTUATORS]; /* commands before limits, without noise */
     double limited;                        /* share of the last time in which one of these was beyond a limit */
@@ -81,6 +82,7 @@ typedef struct {
     double usual;            /* rate, in the mean of the last time */
     double order;            /* integral of the ordered acceleration, without what it was long ago */
     double late[2], rate[2]; /* x and r, after one low-pass filter and after two */
+    double unseen[2]; /* time without a measured rate [s], and the integral of the ordered acceleration over it */
 } towline_turning_axis;
 
 enum { TOWLINE_TURNING_SUMS = 5 };

@@ -151,7 +151,7 @@ static double turn_measured(const flier *it, const double *tensions, towline_tur
         now->rate[k] = wanted[k] - rate[k];
         now->steady[k] = 0;
         now->steady[3 + k] = moment[k] + gyroscopic[k] - turned[k];
-        it->memory->ordered[k] = bent[k];
+        now->bent[k] = bent[k];
     }
     now->steady[2] = dot(force, axis);
     return sqrt(fmax(dot(force, force) - now->steady[2] * now->steady[2], 0));
@@ -206,7 +206,8 @@ static double wrench_of_carrier(const flier *it, double dt, const double *tensio
     }
     for (int k = 0; k < 3; k++) {
         faster[k] = 2 * h * (turning_back(it, k, turn->away[k]) + turn->rate[k]);
-        it->memory->ordered[k] = measured ? it->memory->ordered[k] + faster[k] : NAN;
+        it->memory->ordered[k] = turn->bent[k] + faster[k];
+        if (!measured) { it->memory->turning[k] = NAN; }
     }
     constant_times(it->body->inertia, faster, moment);
     for (int k = 0; k < 3; k++) {

@@ -37,10 +37,22 @@ static const double ALIKE = 1e-3;  /* of the product of their squares: derivativ
 
 enum { SUMS = TOWLINE_TURNING_SUMS };
 
-/* Add one axis to the sums; its comparison starts again where a number is none. */
-static void follow(double bandwidth, double dt, double order, double rate, towline_turning_axis *it, double *sums) {
+/*
+ * Add one axis to the integrals. What is ordered until a rate is measured counts as one longer step. The comparison
+ * starts again after a window without a rate, and where a number is none.
+ */
+static void follow(double bandwidth, double step, double ordered, double rate, towline_turning_axis *it, double *sums) {
+    it->unseen[0] += step;
+    it->unseen[1] += step * ordered;
+    if (!isfinite(rate)) { return; }
+    const double dt = it->unseen[0], turned = it->unseen[1];
+    it->unseen[0] = it->unseen[1] = 0;
+    if (dt * bandwidth > WINDOW) {
+        *it = (towline_turning_axis){.usual = rate};
+        return;
+    }
     const double share = 1 - exp(-bandwidth * dt), slow = dt * bandwidth / WINDOW, per = dt > 0 ? share / dt : 0;
-    it->order += dt * order - slow * it->order;
+    it->order += turned - slow * it->order;
     it->usual += slow * (rate - it->usual);
     const double change = rate - it->usual - it->rate[0], change_of_late = it->rate[0] - it->rate[1];
     const double before = it->late[1] - it->rate[1];
@@ -55,7 +67,7 @@ static void follow(double bandwidth, double dt, double order, double rate, towli
     const double first = per * change_of_late, second = per * per * (change - change_of_late);
     const double off = (before + it->late[1] - it->rate[1]) / 2; /* when the derivatives are these */
     const double products[] = {off * first, off * second, first * first, first * second, second * second};
-    for (int k = 0; k < SUMS; k++) { sums[k] += products[k]; }
+    for (int k = 0; k < SUMS; k++) { sums[k] += dt * products[k]; }
 }
 
 /* Return T + 4 C / T of sums, 0 if it is not positive, and write T. */
@@ -91,7 +103,7 @@ void towline_measure_lag(const towline_robot *robot, double bandwidth, double dt
         }
     }
     if (!again) {
-        for (int k = 0; k < SUMS; k++) { it->sums[k] += dt / window * (now[k] - it->sums[k] / MEMORY); }
+        for (int k = 0; k < SUMS; k++) { it->sums[k] += (now[k] - dt * it->sums[k] / MEMORY) / window; }
     }
     const double rate = SEEN * WINDOW * bandwidth * bandwidth / LATE;
     double T = 0;
