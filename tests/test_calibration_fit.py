@@ -260,3 +260,15 @@ def test_lengths_alone_of_a_large_robot_are_believed_as_far_as_they_tell(seed):
     assert known.sum() >= 4
     assert (error @ vectors[:, known]) ** 2 @ (1 / values[known]) < chi2.ppf(0.999, known.sum()), error
     assert np.abs(error).max() < 1.5  # of files that are wrong by 0.3 m, one standard deviation
+
+
+def test_ends_of_cables_stay_in_the_plane_of_a_planar_robot():
+    """Lengths do not tell the side to which an end is out of its plane, so errors of the model must not move it."""
+    robot, log = far_from_the_file("planar-4", 3, [0.3, 0, 0.3, 0, 0.2, 0], 0.02)
+    seen = log.poses + np.random.default_rng(3).normal(0, 5e-4, log.poses.shape) * [0, 1, 0, 0, 0, 0]
+    wrong = log.changed(lengths=log.lengths * [1.0, 1.01, 0.99, 1.0], poses=seen)
+    result = calibrate(robot, wrong, ("anchors", "offsets"), {"anchors": 0.03})
+    ends = [one for one in result.parameters if one.name.endswith("anchor.y")]
+    assert result.converged
+    assert [one.correction for one in ends] == [0.0] * 4
+    np.testing.assert_allclose([one.sigma for one in ends], 0.03, rtol=1e-6)

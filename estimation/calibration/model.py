@@ -36,7 +36,7 @@ from ..logs.pose_track import PoseTrack
 from .balance import Balance, Balanced, FeltTensions, needs_balance
 from .carrier_motion import CarrierMotion
 from .geometry import runs
-from .parameters import COMMON, FRAMES, IN_BALANCE, OF_CABLE, OF_ROBOT, Parameters, normal_rows, prior_sigmas
+from .parameters import COMMON, FRAMES, IN_BALANCE, OF_CABLE, OF_ROBOT, Parameters, in_plane, prior_sigmas
 from .pose_frames import Poses, reframed, twists_of
 from .sightings import Sighted, sightings
 
@@ -161,17 +161,17 @@ class Model(Displayed):
 
     @cached_property
     def kept_rows(self) -> np.ndarray:
-        """Return all rows (d, P) whose products with the change from the file are zero.
-
-        Where cables stay in a plane, ends move normal to it without effect, to first order. Noise would move them far.
-        """
-        parameters, given = self.parameters, self.measurements
-        rows = normal_rows(parameters)
-        if given.carrier_poses is not None or given.directions is not None:
-            rows = rows[:0]
-        rows = rows if self.kept is None else np.vstack([rows, self.kept])
-        used = np.isfinite(self.prior_sigmas) | ~parameters.varies
+        """Return all rows (d, P) whose products with the change from the file are zero; a prior holds them, too."""
+        rows = np.zeros((0, self.parameters.count)) if self.kept is None else self.kept
+        used = np.isfinite(self.prior_sigmas) | ~self.parameters.varies
         return rows[~(rows[:, used] != 0).any(axis=1)]
+
+    @cached_property
+    def _in_plane(self) -> np.ndarray:
+        """Return what derivatives by ends of cables are multiplied by, so that ends stay in their plane, (m, 6, 6)."""
+        given = self.measurements
+        leave = given.carrier_poses is not None or given.directions is not None
+        return np.eye(6) if leave else in_plane(self.parameters)
 
     @cached_property
     def _forces(self) -> Balance:
@@ -207,7 +207,7 @@ class Model(Displayed):
         if count <= PART:
             yield slice(None), self, state
             return
-        known = {name: getattr(self, name) for name in ("size_is_open", "prior_sigmas", "kept_rows")}
+        known = {name: getattr(self, name) for name in ("size_is_open", "prior_sigmas", "kept_rows", "_in_plane")}
         for first in sorted(range(0, count, PART), reverse=backwards):
             part = self.only(rows := slice(first, first + PART))
             balanced = None if self.balanced is None else part.forces
@@ -338,7 +338,7 @@ class Model(Displayed):
         by_length = (gain * stretch)[..., None]
         by_pose = by_length * run.by_pose
         cables = np.empty((m, len(position), OF_CABLE))
-        cables[..., :6] = by_length * run.by_geometry[..., :6]
+        cables[..., :6] = by_length * (run.by_geometry[..., :6] @ self._in_plane)
         cables[..., 6] = -gain
         cables[..., 7] = -gain * (excess / scale if self.size_is_open else y)
         cables[..., 8] = by_length[..., 0] * run.by_geometry[..., 6]

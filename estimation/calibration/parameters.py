@@ -215,3 +215,16 @@ def normal_rows(parameters: Parameters) -> np.ndarray:
                 parameters.table(row)[i, first : first + 3] = end
                 rows.append(row)
     return np.array(rows).reshape(-1, parameters.count)
+
+
+def in_plane(parameters: Parameters) -> np.ndarray:
+    """Return the projections of both ends of each cable on the plane that they stay in, (m, 6, 6).
+
+    Ends move normal to it without effect, to first order. Noise and errors of a model would move them far to either
+    side, so fits do not move them at all.
+    """
+    result = np.tile(np.eye(6), (parameters.robot.m, 1, 1))
+    for row in normal_rows(parameters):
+        ends = parameters.table(row)[:, :6]
+        result -= ends[:, :, None] * ends[:, None]
+    return result
