@@ -66,3 +66,4 @@ class CarriedLoad:
             weight = dynamics.required_wrench(pose, 0 * velocity, 0 * velocity)
             momentum = dynamics.required_wrench(pose, 0 * velocity, velocity) - weight
             platform["explained"][known] = momentum - platform["disturbance"][known] / bandwidth
+            platform["unseen"][known] = 0.0

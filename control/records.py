@@ -33,7 +33,7 @@ CABLE = np.dtype(
 PLATFORM = np.dtype(
     [
         *((name, "f8", 6) for name in ("integral", "disturbance", "explained")),
-        ("attitude", "f8"),
+        *((name, "f8") for name in ("unseen", "attitude")),
         ("integrates", "i8"),
         ("silent", "i8"),
     ]
@@ -42,7 +42,9 @@ _TURN = np.dtype([("steady", "f8", 6), *((name, "f8", 3) for name in ("bent", "a
 CARRIER = np.dtype(
     [
         *((name, "f8", 6) for name in ("offset", "offset_rate")),
-        *((name, "f8", 3) for name in ("force", "explained", "ordered", "turning")),
+        *((name, "f8", 3) for name in ("force", "explained")),
+        ("unseen", "f8"),
+        *((name, "f8", 3) for name in ("ordered", "turning")),
         ("lacking", "f8"),
         ("wanted", "f8", MOST_ACTUATORS),
         ("limited", "f8"),

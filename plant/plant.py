@@ -358,11 +358,15 @@ class Plant:
         return self._with_condition(state, cable, layout.CUT)
 
     def stick(self, state: np.ndarray, cable: int) -> np.ndarray:
-        """Return the state, (..., n) [m, rad, s], with a winch stuck at its current length. Arguments as in `cut`."""
+        """Return the state, (..., n) [m, rad, s], with a winch stuck at its current length. Arguments as in `cut`.
+
+        A cable that is cut stays cut.
+        """
         return self._with_condition(state, cable, layout.STUCK)
 
     def _with_condition(self, state: np.ndarray, cable: int, condition: float) -> np.ndarray:
         result = as_array("state", state, (self.size,)).copy()
         index = whole_number("cable", cable, 0, self.robot.m - 1)
-        result[..., self._places + layout.CONDITION * self.robot.m + index] = condition
+        of_cable = result[..., self._places + layout.CONDITION * self.robot.m + index, None]
+        np.maximum(of_cable, condition, out=of_cable)  # what is cut stays so
         return result

@@ -246,7 +246,7 @@ def check_wrench(event: Event, wrench: Any, shape: tuple[int, ...], time: float)
     """
     try:
         given = np.asarray(wrench, dtype=float)
-        values = np.zeros(shape)
+        values = np.full(shape, np.nan if given.shape[-1:] != (6,) else 0.0)
         values[:, 0 if given.ndim < 3 else slice(None)] = given
     except (TypeError, ValueError):
         values = np.full(shape, np.nan)

@@ -264,8 +264,8 @@ def _in_turn(robot: Robot, first: Trajectory, events: Sequence[Event]) -> list[t
     parts = [(0.0, first)]
     for event in events:
         begins, current = parts[-1]
-        new = event.follow(robot, current, event.at - begins)
-        parts += [] if new is None else [(event.at, new)]
+        if (new := event.follow(robot, current, event.at - begins)) is not None:
+            parts.append((event.at, required(f"the reference of {type(event).__name__}", new, Trajectory)))
     return parts
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from towline import load, plan, simulate, tensions
-from towline.control import ComputedTorque, Predictive, Reference, State
+from towline.control import ComputedTorque, Controller, Predictive, Reference, State
 from towline.models import Robot
 
 LATE = {"delay": 0.02, "stamped": True}
@@ -62,3 +62,45 @@ def test_a_first_state_that_is_late_is_not_that_of_a_falling_robot(make, known):
             seen = None if late._known_age else time - 0.03
             command = late.step(time, state._replace(time=seen), reference)
             assert np.abs(command.tensions - same[step]).max() < 1e-3 * robot.force_scale
+
+
+class Sparse(Controller):
+    """Passes states on, of which those that are not `seen` at their number have no pose."""
+
+    def __init__(self, controller, seen):
+        self.controller, self.seen = controller, seen
+
+    def reset(self):
+        self.controller.reset()
+        self.steps = 0
+
+    def step(self, time, state, reference):
+        self.steps += 1
+        known = state if self.seen(self.steps) else state._replace(pose=np.full(6, np.nan))
+        return self.controller.step(time, known, reference)
+
+
+def test_a_missing_state_is_no_disturbance():
+    """With 30 % of them missing, observers took as much of the mass times the acceleration, 3 N, for a disturbance."""
+    robot, line = load("planar-4"), {"kind": "line", "start": [0, 0, 0.75], "end": [0.2, 0, 0.85]}
+    missing, controller = np.random.default_rng(3).random(1000) < 0.3, ComputedTorque(robot)
+    run = simulate(robot, plan(robot, {"path": line, "duration": 0.8}), Sparse(controller, lambda k: not missing[k]))
+    assert run.error.max() < 2e-4  # 4.7 mm
+    assert np.abs(controller.disturbance).max() < 0.01 * robot.weight
+
+
+@pytest.mark.parametrize("name", ["planar-4", "multi-quadrotor-3"])
+def test_a_disturbance_is_found_by_every_fifth_state(name):
+    robot, every = load(name), {}
+    carriers = [0.5, 0, 0] if name.startswith("multi") else [0, 0, 0]
+    events = [f"push {robot.carriers[0].name} 0.5 0 0 at 0"] if any(carriers) else []
+    push = 0.03 * robot.weight
+    for one_in in (1, 5):
+        controller = every[one_in] = ComputedTorque(robot)
+        sparse = Sparse(controller, lambda k, one_in=one_in: k % one_in == 0)
+        simulate(robot, robot.home, sparse, disturbance=[push, *[0] * 5], events=events, duration=0.8)
+    assert every[5].disturbance[0, 0] == pytest.approx(push, rel=0.05)
+    for found in ("disturbance", "disturbance_of_carriers"):
+        first, other = (getattr(one, found) for one in every.values())
+        np.testing.assert_allclose(other, first, atol=0.05 * push)
+    np.testing.assert_allclose(every[5].disturbance_of_carriers[0, 0], carriers, atol=0.1)

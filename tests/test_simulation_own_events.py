@@ -218,10 +218,14 @@ def test_the_example_of_the_page_is_short_and_runs(capsys):
 
 
 @pytest.mark.parametrize(
-    ("wrench", "message"),
-    [(None, None), (np.zeros(5), "six finite"), (np.full(6, np.nan), "six finite"), ("no", "six finite")],
+    ("wrench", "reference", "message"),
+    [
+        (None, None, None),
+        *((odd, None, "six finite") for odd in (np.zeros(5), np.full(6, np.nan), "no", 3.0)),
+        (None, 5, "the reference of Odd must be a Trajectory, got 5"),
+    ],
 )
-def test_what_an_own_event_returns_is_checked(robot, wrench, message):
+def test_what_an_own_event_returns_is_checked(robot, wrench, reference, message):
     class Odd(Event):
         kind: Literal["odd"] = "odd"
 
@@ -230,6 +234,9 @@ def test_what_an_own_event_returns_is_checked(robot, wrench, message):
 
         def wrench(self, time, motions):
             return wrench
+
+        def follow(self, robot, trajectory, time):
+            return reference
 
     try:
         if message is None:

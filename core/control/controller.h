@@ -51,6 +51,7 @@ typedef struct {
     double integral[6];    /* of the error */
     double disturbance[6]; /* estimated: what acts beside cables and weight */
     double explained[6];   /* momentum less what the estimate explains */
+    double unseen;         /* time without a usable state until now [s] */
     double attitude;       /* bandwidth with which flying carriers turn [rad/s] */
     int64_t integrates;    /* 1: the integral goes on */
     int64_t silent;        /* steps in which tensions were commanded and no sensor reported one; from 2 on it matters */
@@ -69,6 +70,7 @@ typedef struct {
     double offset[6], offset_rate[6]; /* off its reference, to help the tensions; small rotations in level axes */
     double force[3];                  /* estimated: what acts beside thrust, cables and weight, in {G} [N] */
     double explained[3];              /* momentum less what the estimate explains */
+    double unseen;                    /* time without a usable state until now [s] */
     double ordered[3];                /* angular acceleration within the actuators' limits, in its own axes */
     double turning[3];                /* rate that is measured, in its own axes; nan while none is */
     double lacking;                   /* thrust that its actuators do not give, or give too much, by their limits [N] */

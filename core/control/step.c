@@ -16,19 +16,39 @@
 #include "control/observer.h"
 #include "control/usable.h"
 
+/* Write what weight and cables do to the platform (6); a cable whose sensor reports nothing pulls as commanded. */
+static void known_wrench(const towline_robot *robot, const towline_row *row, double *known) {
+    double tensions[TOWLINE_MOST_CABLES];
+    for (int i = 0; i < robot->cables; i++) {
+        const towline_cable_memory *cable = &row->cables[i];
+        tensions[i] = are_numbers(&cable->measured, 1) ? cable->known : cable->then;
+    }
+    wrench_of(robot, row->A, tensions, known);
+    for (int k = 0; k < 3; k++) { known[k] += robot->mass * robot->gravity[k]; }
+}
+
 /* Update the estimated disturbance, by the momentum that A t + m g + d does not explain. */
 static void observe_platform(const towline_robot *robot, const towline_controller *controller, double since,
                              const configuration *at, const double *velocity, const towline_row *row) {
-    double tensions[TOWLINE_MOST_CABLES], momentum[6], pull[6];
-    for (int i = 0; i < robot->cables; i++) { tensions[i] = row->cables[i].known; }
-    wrench_of(robot, row->A, tensions, pull);
+    double momentum[6], known[6];
+    towline_platform_memory *memory = row->platform;
+    known_wrench(robot, row, known);
     momentum_of(robot, &at->platform, at->com, velocity, momentum);
     for (int k = 0; k < 6; k++) {
-        const double weight = k < 3 ? robot->mass * robot->gravity[k] : 0;
-        double *estimate = &row->platform->disturbance[k];
-        observe(controller->observer, since, momentum[k], weight + pull[k], estimate, &row->platform->explained[k]);
+        double *estimate = &memory->disturbance[k];
+        observe(controller->observer, since, memory->unseen, momentum[k], known[k], estimate, &memory->explained[k]);
         *estimate *= robot->freedom[k];
     }
+    memory->unseen = 0;
+}
+
+/* Let A t + m g + d, with the last known A, act for a step without a usable state. */
+static void observe_unseen(const towline_robot *robot, double since, const towline_row *row) {
+    double known[6];
+    towline_platform_memory *memory = row->platform;
+    observe_nothing(since, &memory->unseen);
+    known_wrench(robot, row, known);
+    for (int k = 0; k < 6; k++) { memory->explained[k] += since * (known[k] + memory->disturbance[k]); }
 }
 
 /* Write the error of the pose and that of its rate (6), and the accelerations of the reference; angular ones as e. */
@@ -115,6 +135,7 @@ void towline_write_problem(const towline_robot *robot, const towline_controller 
     row.platform->silent = silent ? row.platform->silent + 1 : 0;
     if (!is_usable(robot, &row)) {
         for (int k = 0; k < 6; k++) { row.w[k] = NAN; }
+        if (since > 0 || dt == 0) { observe_unseen(robot, since, &row); }
         if (controller->reacts) { towline_add_offsets(robot, &row); }
         return;
     }

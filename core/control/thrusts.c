@@ -78,10 +78,13 @@ static void observe_carrier(const flier *it, double dt, const towline_cable_memo
     const ptrdiff_t per = sizeof(towline_cable_memory) / sizeof(double);
     add_pull(it, &cables[0].known, per, known, moment);
     for (int k = 0; k < 3; k++) {
+        double *estimate = &it->memory->force[k], *explained = &it->memory->explained[k];
         known[k] += mass * it->robot->gravity[k];
-        observe(it->controller->observer, dt, mass * it->motion[6 + k], known[k], &it->memory->force[k],
-                &it->memory->explained[k]);
+        *explained += it->memory->unseen * (known[k] + *estimate); /* thrust and pull stay while a state is missing */
+        observe(it->controller->observer, dt, it->memory->unseen, mass * it->motion[6 + k], known[k], estimate,
+                explained);
     }
+    it->memory->unseen = 0;
 }
 
 /* Write the thrust F that a carrier needs, in {G}, and the moment of its cables. */
@@ -260,7 +263,11 @@ double towline_write_thrusts(const towline_robot *robot, const towline_controlle
         double wrench[6], *actuation = flight.actuation + most * c;
         memcpy(ordered[c], it.memory->ordered, sizeof ordered[c]);
         if (body->actuators > 0) {
-            if (measured) { observe_carrier(&it, dt, flight.cables, actuation); }
+            if (measured) {
+                observe_carrier(&it, dt, flight.cables, actuation);
+            } else {
+                observe_nothing(dt, &it.memory->unseen);
+            }
             const double across = wrench_of_carrier(&it, dt, flight.tensions, actuation, wrench);
             command(&it, dt, wrench, across, actuation);
             lacking = fmax(lacking, it.memory->lacking); /* not a number that is none */
