@@ -159,9 +159,9 @@ def derivatives(
             slopes.append(ca.jacobian(values, x))
             others.append(ca.triu(ca.hessian(ca.dot(its, values), x)[0]))
     hessian = sum(others, _matrix(curved, x.numel(), x.numel()))
-    values = ca.vertcat(*(ca.vec(block.values) for block in blocks))
+    nothing = ca.MX(at, 1)  # in place of the values, which IPOPT takes from another function
     return {
-        "jac_g": ca.Function("nlp_jac_g", [x, p], [values, ca.vertcat(*slopes)], ["x", "p"], ["g", "jac_g_x"]),
+        "jac_g": ca.Function("nlp_jac_g", [x, p], [nothing, ca.vertcat(*slopes)], ["x", "p"], ["g", "jac_g_x"]),
         "hess_lag": ca.Function(
             "nlp_hess_l", [x, p, of_objective, multipliers], [hessian], ["x", "p", "lam_f", "lam_g"], ["hess_gamma_x_x"]
         ),
