@@ -13,13 +13,14 @@ from ..base.text import quantity
 from ..models.dynamics import dynamics_of
 from ..models.files import AnyRobot, as_robot
 from ..models.points import axial, rotations
-from ..models.trajectory import moved_on
+from ..models.trajectory import Motion, moved_on
 from .as_floats import as_floats, is_time, measured_at, rows_of
 from .bandwidths import age_of, noise_of
 from .command import HOLD, OFF, PLANNED, Command
 from .controller import Controller
 from .deviation import Deviation
 from .lag import SHORTEST, Lag
+from .late_states import OLDEST
 from .length_gains import LengthGains
 from .noise import Noise
 from .open_loop import planned_command
@@ -30,6 +31,8 @@ DAMPED = 0.002  # [s]: damping of unknown cables, in terms of their stiffness
 PERIOD = 1e-3  # [s]: taken to be that of the steps at the first one
 QUICKEST = 2e-3  # [s]: in which winches follow that are said to have no lag
 SAMPLED = 2000  # references that are looked at before a run
+HELD = 0.2  # [s]: a robot whose pose stays the same for longer does not move
+MEMORY = 1.0  # [s], of the largest age, on which gains depend
 
 
 class LengthControl(Controller):
@@ -54,9 +57,10 @@ class LengthControl(Controller):
         lag: Time constant with which the winches follow their commands [s], which the lengths make up for.
         proportional, integral: P, and I [1/s]; 0 and 0 for lengths without correction. The default is the largest, up
             to 4 and 10, with which no oscillation of the platform on its cables grows (control/length_gains.py). It
-            depends on the age of the measured pose (from its `time`, or else from `sensors`), and is 0 for cables with
-            no damping. For a late pose without its `time`, give the sensors or the gains: with the gains for a
-            current pose, oscillations grow.
+            depends on the largest age of the measured pose, and is 0 for cables with no damping. The age follows from
+            its `time`, or else from the delay of `sensors` and the time since the pose changed, up to 0.2 s. For a late
+            pose without its `time`, give the sensors or the gains: with the gains for a current pose, oscillations
+            grow.
         most: Largest correction of a length [m]; default: 5 % of `Robot.length`, but at least 0.5 % of the longest
             cable, about as much as that cable may stretch. At this value the integral stops, and the status is "hold".
         sensors: Errors and delay of the sensors, a `simulation.Noise` or a mapping (default: unknown). The default of P
@@ -110,9 +114,9 @@ class LengthControl(Controller):
         gains = ("proportional", proportional, 100.0), ("integral", integral, 1e3)
         self._given = [None if gain is None else number(name, gain, 0.0, most) for name, gain, most in gains]
         noise = None if sensors is None else noise_of(sensors)
-        self._age = 0.0 if noise is None else age_of(noise)
+        self._delay, self._longest = (0.0, 0.0) if noise is None else (noise.delay, 2 * age_of(noise) - noise.delay)
         self._gains = LengthGains(self.robot, self.stiffness, self._damping, self._lag, noise)
-        self.corrects = any(self._gains_for(PERIOD, self._age))
+        self.corrects = any(self._gains_for(PERIOD, self._longest))
         if None in self._given and not self.corrects:
             least = quantity(float(self._damping.min()), "N s/m")
             warn(
@@ -131,6 +135,10 @@ class LengthControl(Controller):
         self._period = np.inf  # of the references [s], inf: unknown
         self._winches, self._sent = Lag(self._lag), np.zeros(0)  # and their lengths without corrections, (..., m)
         self._strain: np.ndarray | None = None  # commanded at the last step, (..., m)
+        self._pose, self._held = np.zeros(0), 0.0  # last measured, and the time since it changed [s]
+        self._unseen, self._oldest = 0.0, self._longest  # time without a pose, and the largest age [s]
+        self._past: list[tuple[float, Motion]] = []  # times and references of earlier steps
+        self._errors: tuple[np.ndarray, ...] = ()  # of pose and of speeds of the cables, at the last step
 
     @override
     def follow(self, references: Sequence[Reference], period: float, start: float = 0.0) -> None:
@@ -159,8 +167,8 @@ class LengthControl(Controller):
     def step(self, time: float, state: State, reference: Reference) -> Command:
         """Return the lengths for the time from `time` [s] on, with the planned tensions and motion of the carriers.
 
-        The correction needs the pose of the state, and with a lag its velocity. A state is compared
-        with the plan at its time; without a time, its age is that of readings of the `sensors`.
+        The correction needs the pose of the state, and with a lag its velocity; without these, the last one stays.
+        A state is compared with the plan at its time.
 
         Raises:
             InputError: If an argument has a wrong shape or value, the lengths of the reference overflow, or no tensions
@@ -174,7 +182,7 @@ class LengthControl(Controller):
         dt = 0.0 if self._time is None else float(time) - self._time
         period = min(dt or np.inf, self._period)  # until the next step; more than that may have passed since the last
         period = period if np.isfinite(period) else PERIOD
-        age = self._age if state.time is None else time - measured_at(state.time, time)
+        age = self._age_of(float(time), dt, state)
         tensions, lengths_of = self._tensions_of(reference), self._dynamics.cable_lengths
         far = lengths_of(*(moved_on(part, period)[0] for part in (reference[:3], reference[3:6])))
         strain = self._strained(dt, tensions, far)
@@ -186,10 +194,30 @@ class LengthControl(Controller):
             self._winches.follow(self._sent, dt)
         given, lead = self._winches.value, _lead(self._lag, period)
         self._sent = given + lead / period * (far / (1.0 + strain) - given)
-        corrected, status = self._correction(dt, period, lead - period, age, state, reference)
+        planned = self._planned_at(float(time) - age, float(time), reference)
+        corrected, status = self._correction(dt, period, lead - period, planned, state, reference)
         lengths, self._strain, self._time = self._sent + corrected, strain, float(time)
         command = planned_command(self.robot, reference, rows)
         return command._replace(answered=status, lengths=np.broadcast_to(lengths, command.tensions.shape))
+
+    def _age_of(self, time: float, dt: float, state: State) -> float:
+        """Return the age of the measured pose [s], and remember the largest one."""
+        known, old = np.isfinite(state.pose), self._pose if self._pose.shape == state.pose.shape else np.nan
+        pose = np.where(known, state.pose, old)
+        self._held = min(self._held + dt, HELD) if np.array_equal(pose, old) else 0.0
+        self._pose, self._unseen = pose, 0.0 if known.all() else self._unseen + dt
+        age = self._delay + self._held if state.time is None else time - measured_at(state.time, time)
+        self._oldest = max(age + self._unseen, self._oldest * float(np.exp(-dt / MEMORY)), self._longest)
+        return age
+
+    def _planned_at(self, measured: float, time: float, reference: Reference) -> Motion:
+        """Return the reference of the platform at the time at which a pose was measured [s], and remember this one."""
+        pose, velocity, acceleration = (np.array(part) for part in reference[:3])
+        self._past.append((time, (pose, velocity, acceleration)))
+        while len(self._past) > 1 and self._past[1][0] <= max(measured, time - OLDEST):
+            self._past.pop(0)
+        at, motion = self._past[0]
+        return moved_on(motion, measured - at)
 
     def _tensions_of(self, reference: Reference) -> np.ndarray:
         """Return the planned tensions, (..., m) [N]; they may jump, and are not extrapolated."""
@@ -208,10 +236,10 @@ class LengthControl(Controller):
         return strain
 
     def _correction(
-        self, dt: float, period: float, lead: float, age: float, state: State, reference: Reference
+        self, dt: float, period: float, lead: float, planned: Motion, state: State, reference: Reference
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the corrections of lengths [m], (..., m), and the status (...): "hold" where one is at its bound."""
-        pose, velocity, _ = moved_on(reference[:3], -age)
+        pose, velocity, _ = planned
         carriers, jacobian, free = reference.carrier_pose, self._dynamics.length_jacobian, self.robot.dof_mask
         with np.errstate(over="ignore", invalid="ignore"):  # of states that overflow
             turned, attitude = (rotations(one[..., 3:]) for one in (pose, state.pose))
@@ -219,14 +247,16 @@ class LengthControl(Controller):
             error[..., 3:] = axial(between)
             behind = np.zeros(1)  # planned minus measured speeds of the cables, (..., m) [m/s]
             if lead:
-                planned, measured = (velocity * free)[..., None], (state.velocity * free)[..., None]
-                behind = (jacobian(pose, carriers) @ planned - jacobian(state.pose, carriers) @ measured)[..., 0]
+                wanted, measured = (velocity * free)[..., None], (state.velocity * free)[..., None]
+                behind = (jacobian(pose, carriers) @ wanted - jacobian(state.pose, carriers) @ measured)[..., 0]
             known = np.asarray(np.isfinite(error).all(axis=-1) & np.isfinite(behind).all(axis=-1))
-        error, behind = (np.where(known[..., None], one, 0.0) for one in (error * free, behind))
         before = np.zeros_like(error) if self._sum is None or self._sum.shape != error.shape else self._sum
+        total = before + dt * np.where(known[..., None], error * free, 0.0)
+        last = self._errors if [one.shape for one in self._errors] == [error.shape, behind.shape] else (0.0, 0.0)
+        seen = zip((error * free, behind), last, strict=True)
+        self._errors = error, behind = tuple(np.where(known[..., None], now, before) for now, before in seen)
         A = self._dynamics.wrench_matrix(reference.pose, carriers)  # (..., 6, m)
-        proportional, integral = self._gains_for(period, age)
-        total = before + dt * error
+        proportional, integral = self._gains_for(period, self._oldest)
         with np.errstate(over="ignore", invalid="ignore"):  # of states that overflow
             ahead = proportional * error + integral * (total + lead * error)
             if any(com := self.robot.platform.com):  # about which A has the moments

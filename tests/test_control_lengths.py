@@ -363,6 +363,16 @@ def test_a_known_delay_without_stamps_is_the_age_of_the_pose(model, motion):
     assert known.error.max() < 5e-3
 
 
+@pytest.mark.parametrize(
+    "sensors", [{"rate": 150}, {"rate": 7, "stamped": True}, {"rate": 7, "delay": 0.15, "stamped": True}]
+)
+def test_held_and_old_poses_of_a_robot_as_in_its_file_change_no_tensions(model, motion, sensors):
+    """They agree with the plan of their time. Compared with that of now, held ones changed tensions by up to 13 kN."""
+    run = simulate(model, motion, LengthControl(model), noise=sensors, period=PERIOD, duration=1.5)
+    planned = np.array([each.tensions for each in run.references[: run.lasted]])
+    assert np.abs(run.record.tensions - planned).max() < 1e-3 * (model.t_max - model.t_min).max()
+
+
 @pytest.mark.parametrize("damping", [None, 300.0])
 def test_a_circle_on_stiff_cables_begins_and_goes_on_with_its_tensions(damping):
     """Lengths that were a period late, by 0.45 mm at 0.45 m/s, would change tensions by 150 N on these cables."""
