@@ -87,6 +87,8 @@ class Filtered(Controller):
         required("state", state, State)
         seen = time if state.time is None else measured_at(state.time, time)
         pose = np.array(state.pose, dtype=float)
+        if self._found is None and not np.isfinite(pose).all():  # nothing to begin with
+            return self.controller.step(time, state, reference)
         new = self._pose is None or not np.array_equal(pose, self._pose)
         self._pose = pose
         found = self._found = self._estimate(seen, pose if new else None, state, time, reference)

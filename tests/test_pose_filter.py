@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from towline import InputError, load, plan, simulate
-from towline.control import ComputedTorque, Filtered, Reference, State
+from towline.control import ANSWERS, ComputedTorque, Filtered, Reference, State
 from towline.estimation import PoseFilter
 
 PARTS, SENSOR = 10, np.array([0.1, 0.0, 0.05])
@@ -218,6 +218,9 @@ def test_a_late_first_pose_and_a_state_from_the_future_leave_a_controller_usable
         with pytest.raises(InputError, match=r"state.time must be a number up to the step's time"):
             late.step(1.01, *rests(robot.home, time))
     assert late.step(1.01, *rests(robot.home, 1.0)).answered == 0
+    late.reset()
+    answers = [late.step(k, *rests(pose, k)).answered for k, pose in enumerate((np.full(6, np.nan), robot.home))]
+    assert answers == [ANSWERS.index("hold"), 0]  # it begins with the first pose that is measured
 
 
 class Blind(ComputedTorque):

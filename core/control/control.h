@@ -22,7 +22,7 @@ typedef struct {
     towline_cable_memory *cables;
     towline_platform_memory *platform;
     towline_carrier_memory *carrier_memory; /* NULL if they follow their reference */
-    double *A;                              /* (6, m): the problem's wrench matrix, */
+    double *A;                              /* (6, m): the problem's wrench matrix, kept between steps, */
     double *w;                              /* (6): wrench, */
     double *low, *high;                     /* (m): and bounds of tensions */
 } towline_row;

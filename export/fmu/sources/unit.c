@@ -77,7 +77,7 @@ static void stay_inside(towline_unit *unit) {
 static void control(towline_unit *unit, double dt) {
     const towline_robot *robot = &unit->known;
     const int m = robot->cables;
-    double A[6 * UNIT_CABLES], w[6], low[UNIT_CABLES], high[UNIT_CABLES];
+    double w[6], low[UNIT_CABLES], high[UNIT_CABLES];
     for (int i = 0; i < m; i++) {
         unit->cable[i].then = unit->cable[i].last;
         unit->cable[i].measured = unit->mean_tension[i];
@@ -92,13 +92,13 @@ static void control(towline_unit *unit, double dt) {
         .cables = unit->cable,
         .platform = &unit->platform,
         .carrier_memory = unit->carrier,
-        .A = A,
+        .A = unit->A,
         .w = w,
         .low = low,
         .high = high,
     };
     towline_write_problem(robot, &unit->controller, dt, dt, row);
-    const towline_problem problem = {6, m, A, w, low, high, unit->t_ref, NULL, unit->length, 0};
+    const towline_problem problem = {6, m, unit->A, w, low, high, unit->t_ref, NULL, unit->length, 0};
     int answered = solve(unit, &problem, unit->tensions);
     unit->platform.integrates = answered == PLANNED;
     for (int i = 0; i < m; i++) {

@@ -45,6 +45,7 @@ typedef struct {
     double box[2][UNIT_CARRIERS][3];     /* lowest and highest positions of carriers [m] */
     towline_cable_memory cable[UNIT_CABLES];
     towline_platform_memory platform;
+    double A[6 * UNIT_CABLES]; /* of the last usable state */
     towline_carrier_memory carrier[UNIT_CARRIERS];
     towline_turning turning;
     double last_time; /* of its last step [s] */
