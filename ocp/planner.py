@@ -22,6 +22,7 @@ from .search.search import Search
 from .search.shortest_durations import Chosen, shortest_durations
 from .search.start import deviation_from
 from .search.stops_within import stopping_within
+from .search.time_law import PathTiming
 from .search.uncertain_robots import for_robots, judged
 from .stages import climb
 from .tasks.deviation import Deviation
@@ -146,14 +147,17 @@ class Planner(Displayed):
             if self._share is not None:
                 plan = for_robots(plan, self._share, partial(self._plan_again, search))
             if (within := self.scenario.task.stop_within) is not None:
-                plan = stopping_within(plan, self.scenario, within, partial(self._plan_again, search))
+                again = partial(self._plan_again, search, timing=search.timing)
+                plan = stopping_within(plan, self.scenario, within, again)
         self._search = None
         self._flown = plan if plan.feasible else None
         return plan
 
-    def _plan_again(self, first: Search, scenario: Scenario, start: Deviation | None) -> Plan:
-        """Plan another scenario in the remaining time of the first search."""
-        self._search = search = Search(scenario, {}, first.progress, first.seconds_left)
+    def _plan_again(
+        self, first: Search, scenario: Scenario, start: Deviation | None, timing: PathTiming | None = None
+    ) -> Plan:
+        """Plan another scenario in the remaining time of the first search; `timing` is that of the same path."""
+        self._search = search = Search(scenario, {}, first.progress, first.seconds_left, timing=timing)
         return replace(climb(search, start, None), stages=tuple(search.stages))
 
     def replan(

@@ -23,7 +23,7 @@ from .audits.violation import cost, relative_violation
 from .global_path.global_path import motion_past
 from .nlp.rows import Mesh
 from .plan import Plan
-from .proofs.durations import Durations, durations
+from .proofs.durations import Durations
 from .proofs.infeasible_ends import infeasible_ends
 from .proofs.too_little_power import too_little_power
 from .result import Offers, Relaxed
@@ -35,7 +35,7 @@ from .search.relaxations import near_fixed_motion
 from .search.search import Search
 from .search.slower import longer_phases, slower_rate
 from .search.stronger_or_nearer import near_chosen_motion, stronger_or_nearer
-from .search.time_law import BOUND, fastest
+from .search.time_law import BOUND
 from .tasks.deviation import Deviation
 from .tasks.ends import between_fixed_values
 from .tasks.scenario import Scenario
@@ -79,7 +79,7 @@ def _fixed_motion(search: Search) -> Plan:
     if not audit.passed and other_tensions_may_pass(search.scenario, audit):
         if proven := too_little_power(search.scenario):
             audit = replace(audit, excess=proven)
-            left = _durations(search, search.scenario)
+            left = _durations(search)
             offers = partial(_offered, _near_fixed, search, search.scenario, left, audit)
             return Plan(search.scenario, status, None, audit, build_s=0.0, solve_s=spent, offers=offers)
         chosen = _free_motion(search, None)
@@ -97,7 +97,7 @@ def _fixed_motion(search: Search) -> Plan:
         return chosen if chosen.feasible and cost(chosen) < cost(plan) else plan
     if isinstance(search.scenario.wind_set, WindDisc) and audit.certificate is None and not audit.excess:
         return replace(plan, status=MotionStatus.NOT_FOUND, reason=UNPROVEN)
-    left = _durations(search, search.scenario)
+    left = _durations(search)
     return replace(plan, offers=partial(_offered, _near_fixed, search, search.scenario, left, audit))
 
 
@@ -114,10 +114,10 @@ def _near_fixed(search: Search, scenario: Scenario, left: Durations | None, audi
     return phases + others
 
 
-def _durations(search: Search, scenario: Scenario) -> Durations | None:
+def _durations(search: Search) -> Durations | None:
     """Return the durations that the path allows; None if they are not known."""
     with search.stage("durations") as stage:
-        left = durations(scenario)
+        left = search.timing.durations
         stage.message = "" if left is None else left.describe()
     return left
 
@@ -148,12 +148,12 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
     scenario, span = search.scenario, search.scenario.duration_range
     if span is None:
         return None, True
-    left = _durations(search, scenario)
+    left = _durations(search)
     own = left is None or left.leave(span.min, span.max)
     if own and scenario.task.objective.time is None:
         return None, own
     with search.stage("timing") as stage:
-        fast, stage.message = fastest(scenario)
+        fast, stage.message = search.timing.fastest
     if fast is None or fast.law is None:
         return None, own
     if fast.feasible and span.min <= fast.duration <= span.max:

@@ -28,6 +28,7 @@ from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
 from ..tasks.scheme import SchemeName
 from ..tasks.status import MotionStatus
+from .time_law import PathTiming
 
 NEAR = 0.08  # of a motion's extent: where a place is, of which a program has rows the first time
 FEW = 8  # regions
@@ -55,7 +56,8 @@ class Search:
 
     New `solvers` are added to those that exist already, by mesh. `progress` is called with (iteration, objective,
     infeasibility). All that the search does takes `seconds`, from now on; default: the task's time limit, less what the
-    last audit takes. Each run of a solver takes at most `most_iterations`.
+    last audit takes. Each run of a solver takes at most `most_iterations`. `timing` is what is known of the scenario's
+    path.
     """
 
     def __init__(
@@ -65,8 +67,10 @@ class Search:
         progress: Progress | None,
         seconds: float | None = None,
         most_iterations: int = MOST_ITERATIONS,
+        timing: PathTiming | None = None,
     ):
         self.scenario, self.progress, self._solvers = scenario, progress, solvers
+        self.timing = timing or PathTiming(scenario)
         self._most_iterations = most_iterations
         limit = scenario.task.time_limit
         own = limit - min(FOR_AUDIT * limit, MOST_FOR_AUDIT)

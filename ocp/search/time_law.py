@@ -5,9 +5,12 @@ duration is impossible, and its law is a plan if it keeps the task's other limit
 it differs from the true one by the grid's interval, some tenths of a per cent, so that `BOUND` of it is proven.
 """
 
+from functools import cached_property
+
 from ...base.errors import InputError, SolverError
 from ...base.text import quantity
 from ..plan import Plan
+from ..proofs.durations import Durations, durations
 from ..tasks.paths import LinePath, RestPath, WaypointPath
 from ..tasks.scenario import Scenario
 from ..tasks.task import Tube
@@ -16,6 +19,23 @@ from ..timing.time_along import time_along
 from ..timing.timed_task import KNOWN_LIMITS
 
 BOUND = 0.99  # of the fastest law's time on its grid: no law is faster than this
+
+
+class PathTiming:
+    """Durations and time laws that the path of a scenario allows, computed once for all durations."""
+
+    def __init__(self, scenario: Scenario):
+        self._scenario = scenario
+
+    @cached_property
+    def durations(self) -> Durations | None:
+        """Return the durations that the path allows with its own time law; None if they are not known."""
+        return durations(self._scenario)
+
+    @cached_property
+    def fastest(self) -> tuple[Plan | None, str]:
+        """Return the fastest law along the path, or None, and the message."""
+        return fastest(self._scenario)
 
 
 def fastest(scenario: Scenario) -> tuple[Plan | None, str]:
