@@ -20,7 +20,6 @@ from .command import HOLD, OFF, PLANNED, Command
 from .controller import Controller
 from .deviation import Deviation
 from .lag import SHORTEST, Lag
-from .late_states import OLDEST
 from .length_gains import LengthGains
 from .noise import Noise
 from .open_loop import planned_command
@@ -32,7 +31,7 @@ PERIOD = 1e-3  # [s]: taken to be that of the steps at the first one
 QUICKEST = 2e-3  # [s]: in which winches follow that are said to have no lag
 SAMPLED = 2000  # references that are looked at before a run
 HELD = 0.2  # [s]: a robot whose pose stays the same for longer does not move
-MEMORY = 1.0  # [s], of the largest age, on which gains depend
+MEMORY = 1.0  # [s], of references, and of the largest age of poses, on which gains depend
 
 
 class LengthControl(Controller):
@@ -57,10 +56,10 @@ class LengthControl(Controller):
         lag: Time constant with which the winches follow their commands [s], which the lengths make up for.
         proportional, integral: P, and I [1/s]; 0 and 0 for lengths without correction. The default is the largest, up
             to 4 and 10, with which no oscillation of the platform on its cables grows (control/length_gains.py). It
-            depends on the largest age of the measured pose, and is 0 for cables with no damping. The age follows from
-            its `time`, or else from the delay of `sensors` and the time since the pose changed, up to 0.2 s. For a late
-            pose without its `time`, give the sensors or the gains: with the gains for a current pose, oscillations
-            grow.
+            depends on the largest age of the measured pose (from its `time`, or else from `sensors`), and is 0 for
+            cables with no damping. For a late pose without its `time`, give the sensors or the gains: with the gains
+            for a current pose, oscillations grow. Such a pose is compared with the plan of its time, which is earlier
+            by the sensors' delay and, up to 0.2 s, by the time since the pose changed.
         most: Largest correction of a length [m]; default: 5 % of `Robot.length`, but at least 0.5 % of the longest
             cable, about as much as that cable may stretch. At this value the integral stops, and the status is "hold".
         sensors: Errors and delay of the sensors, a `simulation.Noise` or a mapping (default: unknown). The default of P
@@ -182,12 +181,12 @@ class LengthControl(Controller):
         dt = 0.0 if self._time is None else float(time) - self._time
         period = min(dt or np.inf, self._period)  # until the next step; more than that may have passed since the last
         period = period if np.isfinite(period) else PERIOD
-        age = self._age_of(float(time), dt, state)
         tensions, lengths_of = self._tensions_of(reference), self._dynamics.cable_lengths
         far = lengths_of(*(moved_on(part, period)[0] for part in (reference[:3], reference[3:6])))
         strain = self._strained(dt, tensions, far)
         if not (np.isfinite(far).all() and np.isfinite(strain).all()):
             raise InputError(f"reference must have finite lengths of cables, got pose {shown(reference.pose.tolist())}")
+        age = self._age_of(float(time), dt, state)
         if np.shape(self._winches.value) != far.shape:
             self._winches.value = lengths_of(reference.pose, reference.carrier_pose) / (1.0 + strain)
         elif dt > 0:
@@ -202,19 +201,21 @@ class LengthControl(Controller):
 
     def _age_of(self, time: float, dt: float, state: State) -> float:
         """Return the age of the measured pose [s], and remember the largest one."""
+        age = None if state.time is None else time - measured_at(state.time, time)
         known, old = np.isfinite(state.pose), self._pose if self._pose.shape == state.pose.shape else np.nan
         pose = np.where(known, state.pose, old)
         self._held = min(self._held + dt, HELD) if np.array_equal(pose, old) else 0.0
-        self._pose, self._unseen = pose, 0.0 if known.all() else self._unseen + dt
-        age = self._delay + self._held if state.time is None else time - measured_at(state.time, time)
-        self._oldest = max(age + self._unseen, self._oldest * float(np.exp(-dt / MEMORY)), self._longest)
-        return age
+        self._pose, self._unseen = pose, 0.0 if known.all(axis=-1).any() else self._unseen + dt
+        # A robot at rest has the same pose for long, which is no reason for smaller gains.
+        largest = self._unseen + (self._longest if age is None else age)
+        self._oldest = max(largest, self._oldest * float(np.exp(-dt / MEMORY)), self._longest)
+        return self._delay + self._held if age is None else age
 
     def _planned_at(self, measured: float, time: float, reference: Reference) -> Motion:
         """Return the reference of the platform at the time at which a pose was measured [s], and remember this one."""
         pose, velocity, acceleration = (np.array(part) for part in reference[:3])
         self._past.append((time, (pose, velocity, acceleration)))
-        while len(self._past) > 1 and self._past[1][0] <= max(measured, time - OLDEST):
+        while len(self._past) > 1 and self._past[1][0] <= max(measured, time - MEMORY):
             self._past.pop(0)
         at, motion = self._past[0]
         return moved_on(motion, measured - at)

@@ -62,3 +62,20 @@ def test_winches_keep_their_power(week):
     found = motion(week, "winches")
     rates = np.gradient(found.cable_lengths.values, found.time.values, axis=0)
     assert np.abs(rates * found.tensions.values).max() <= 1500 * 1.01
+
+
+@pytest.mark.parametrize(("name", "printed"), [("gains", "40 rad/s: at most 0."), ("contact", "39.2 N")])
+def test_a_program_has_at_most_fifteen_lines(week, monkeypatch, capsys, name, printed):
+    """The wall and the controller are springs in series: 20 mm / (1 / 2000 N/m + 1 / 1e5 N/m) = 39.2 N."""
+    text = (week / f"{name}.py").read_text()
+    assert f"`python {name}.py`" in (WEEK / "README.md").read_text()
+    assert len([line for line in text.splitlines() if line.strip()]) <= 15
+    monkeypatch.chdir(week)
+    exec(compile(text, name, "exec"), {})
+    assert printed in capsys.readouterr().out
+
+
+def test_robots_that_differ_pass_and_a_replay_blames_nothing(week):
+    assert motion(week, "differs").passed.all()
+    replayed = motion(week, "simulation-replay")
+    assert float(np.abs(replayed.position_residual).max()) < 1e-3
