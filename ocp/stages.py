@@ -43,7 +43,7 @@ from .tasks.status import MotionStatus
 from .tasks.wind_set import WindDisc
 
 NO_SLACK = 1e-3  # of the weight: a motion with less missing at its nodes is a start for another try
-UNPROVEN = "while the platform moves, its speed is added to the task's winds, and in some of these no tensions exist"
+UNPROVEN = "in winds that enclose those of the disc no tensions exist, but no wind of the disc rules the motion out"
 
 
 def climb(search: Search, start: Deviation | None, last: tuple[Mesh, Deviation] | None) -> Plan:
@@ -96,7 +96,7 @@ def _fixed_motion(search: Search) -> Plan:
         chosen = _free_motion(search, None)
         return chosen if chosen.feasible and cost(chosen) < cost(plan) else plan
     if isinstance(search.scenario.wind_set, WindDisc) and audit.certificate is None and not audit.excess:
-        return replace(plan, status=MotionStatus.NOT_FOUND, reason=UNPROVEN)
+        plan = replace(plan, status=MotionStatus.NOT_FOUND, reason=UNPROVEN)
     left = _durations(search)
     return replace(plan, offers=partial(_offered, _near_fixed, search, search.scenario, left, audit))
 

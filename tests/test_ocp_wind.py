@@ -67,7 +67,14 @@ def test_every_force_of_a_disc_is_in_the_hull_of_the_decisive_ones(aero, speed):
     radius[::2] = 5
     samples = np.stack([radius * np.cos(angles), radius * np.sin(angles), np.zeros(60)], axis=1)
     force = dynamics.aerodynamic_wrench(pose, velocity, samples)[:, :3]
-    assert in_hull(force, dynamics.aerodynamic_wrench(pose, velocity, winds)[:, :3])
+    corners = dynamics.aerodynamic_wrench(pose, velocity, winds)[:, :3]
+    assert in_hull(force, corners)
+    # No force is larger along an axis than the disc's own, and the sum along both, of the largest |V|^2, hardly is.
+    along = dynamics.aerodynamic_wrench(pose, velocity, 5 * np.vstack([np.eye(3)[:2], -np.eye(3)[:2]]))
+    own = np.abs(np.diag(along[:2, :2])), np.abs(np.diag(along[2:, :2]))
+    assert np.abs(corners[:, :2]).max(axis=0) == pytest.approx(np.maximum(*own))
+    farthest = dynamics.aerodynamic_wrench(pose, velocity * 0, np.array([[5 + speed, 0, 0]]))[0, 0]
+    assert np.abs(corners[:, :2]).sum(axis=1).max() <= 1.08 * farthest
     possible = np.vstack(possible_winds_at(disc, robot, pose[None], velocity[None]))
     for those in (possible, disc.inner(200), *([winds] if speed == 0 else [])):
         assert np.linalg.norm(those, axis=1).max() <= 5 * (1 + 1e-12)
@@ -186,22 +193,30 @@ def test_a_moving_platform_is_called_infeasible_only_in_a_wind_of_the_disc():
     """Those that enclose the disc are faster while the platform moves; they alone prove nothing."""
     line = {"kind": "line", "start": [-0.1, 0, 0], "end": [0.1, 0.1, 0]}
     statuses = {}
-    for speed in np.linspace(3.0, 5.0, 21):
+    for speed in np.linspace(3.0, 5.0, 11):
         found = plan(hanging(1.0), {"path": line, "duration": 0.8, "wind": {"speed": float(speed)}})
         statuses[found.status] = statuses.get(found.status, 0) + 1
         if found.status is MotionStatus.INFEASIBLE:
             assert np.linalg.norm(found.certificate.wind) <= speed * (1 + 1e-12)
-        if found.status is MotionStatus.NOT_FOUND:
-            assert found.certificate is None
-            assert "that enclose those of the disc" in told(found).splitlines()[0]
         if found.feasible:
             rng, audit = np.random.default_rng(0), found.audit
             for _ in range(20):
                 angle, row = rng.uniform(0, 2 * np.pi), int(rng.integers(len(audit.times)))
                 wind = speed * np.array([np.cos(angle), np.sin(angle), 0])
                 assert feasible_in(found.scenario.robot, audit.motion, audit.carriers, wind, row)
-    assert min(statuses[MotionStatus.FEASIBLE], statuses[MotionStatus.INFEASIBLE]) > 5
-    assert statuses.get(MotionStatus.NOT_FOUND, 0) < 10, statuses
+    assert min(statuses[MotionStatus.FEASIBLE], statuses[MotionStatus.INFEASIBLE]) > 3
+    assert MotionStatus.NOT_FOUND not in statuses, "the winds that enclose those of the disc are hardly faster"
+
+
+def test_a_motion_that_no_wind_of_the_disc_rules_out_is_offered_others(monkeypatch):
+    monkeypatch.setattr("towline.ocp.audits.tensions.possible_winds_at", lambda *_: [])
+    line = {"kind": "line", "start": [-0.1, 0, 0], "end": [0.1, 0.1, 0]}
+    found = plan(hanging(1.0), {"path": line, "duration": 0.8, "wind": {"speed": 4.06}})
+    assert found.status is MotionStatus.NOT_FOUND
+    assert found.certificate is None
+    assert "that enclose those of the disc" in told(found).splitlines()[0]
+    assert "wind" in {each.name for each in found.relaxations}
+    assert all(each.plan.feasible for each in found.relaxations)
 
 
 def test_a_free_motion_is_planned_so_that_every_wind_is_held():

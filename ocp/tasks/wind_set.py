@@ -16,12 +16,22 @@ box if and only if they exist for these (at most nine) winds, and no reserve is 
 four corners do. With the form "printed" X is never negative, Z is linear in X and Y, and the same winds give the
 corners of the rectangle.
 
-**A disc.** From |V| <= r, where r is the speed of the wind and that of the CoM together, follows
-|X| + |Y| = C_d |V|^2 <= C_d r^2: the forces lie in a square on its corner, that of the four winds that are as fast as r
-relative to the CoM along an axis. With lift, or with the form "printed", still air relative to the CoM is the fifth. At
-rest these winds are in the disc themselves, so that they decide exactly. While the platform moves some are faster than
-any of the disc: tensions that exist in them exist in the disc, but that they do not proves nothing. Winds of the disc
-itself, `WindDisc.possible`, have to prove it.
+**A disc.** V fills a disc of radius s about c = -v, where v is the velocity of the CoM. In the quadrant V_1, V_2 >= 0,
+with the axes in their directions there, V_1 is at most a = s + c_1 and V_2 at most b = s + c_2. With c+ = max(c, 0),
+the part of the disc in the quadrant also lies in the ellipse about V = 0 with the semi-axes a' = a + c_2+ / 2 and
+b' = b + c_1+ / 2: along every unit vector n with n_1, n_2 >= 0 the ellipse reaches farther, as the mean of squares is
+at least the square of the mean:
+
+    sqrt(n_1^2 a'^2 + n_2^2 b'^2) >= n_1^2 a' + n_2^2 b' >= s + n_1 c_1 + n_2 c_2,
+
+the latter since n^2 >= n - (1 - n^2) / 2 for c > 0, and n^2 <= n for c < 0. In |X| and |Y| the ellipse is a triangle,
+whose two corners are cut off at a^2 and b^2. So the forces lie in the convex hull of those of two winds a quadrant:
+V_1 = a with V_2^2 = b'^2 (1 - a^2 / a'^2), and the same with both axes exchanged; V_2 is zero for c_2 <= 0. Where b < 0
+the disc does not reach the quadrant; V_2 is b then. These eight winds are as fast as s along one axis. With lift, or
+with the form "printed", the ninth is the one nearest to the CoM's velocity along both axes. At rest the winds are in
+the disc, so that they decide exactly. While the platform moves some are faster than any of the disc: tensions that
+exist in them exist in the disc, but that they do not proves nothing. Winds of the disc itself, `WindDisc.possible`,
+have to prove it.
 """
 
 from itertools import product
@@ -38,8 +48,8 @@ from ...models.rigid_body import com_velocity
 
 # Which value of a coordinate: the box's smallest, its largest, or that of the CoM's velocity.
 LOW, HIGH, ALONG = range(3)
-AXES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 SMOOTHED = 1e-3  # [m/s]: a speed is the root of its square and that of this, which has derivatives at rest
+TINY = 1e-12  # [m/s]
 RING = 16  # winds on the edge of a disc
 
 # Additive recurrence of the plastic number's three-dimensional kin: the fractions of k times these fill a box evenly
@@ -71,7 +81,7 @@ class WindBox(Box):
         for choice in self._choices(aero):
             # The force has a continuous derivative by the clipped wind, since it grows with the square of what clips.
             values = [
-                (self.min[i], self.max[i], ca.fmin(ca.fmax(moving[i], self.min[i]), self.max[i]))[which]
+                (self.min[i], self.max[i], _clipped(moving[i], self.min[i], self.max[i]))[which]
                 for i, which in enumerate(choice)
             ]
             winds.append(ca.vertcat(*values, self.middle[2]))
@@ -113,13 +123,24 @@ class WindDisc(Part):
 
     def count(self, aero: Aero) -> int:
         """Return how many winds decide."""
-        return len(AXES) + _has_kinks(aero)
+        return 8 + _has_kinks(aero)
 
     def decisive(self, aero: Aero, moving: Any, smoothed: float = 0.0) -> list[Any]:
         """Return the winds that decide at a velocity of the CoM (3, 1), as (3, 1) expressions [m/s]."""
-        fast = self.speed + ca.sqrt(ca.sumsqr(moving[:2]) + smoothed**2)
-        winds = [ca.vertcat(moving[0] + x * fast, moving[1] + y * fast, 0.0) for x, y in AXES]
-        return [*winds, ca.vertcat(moving[0], moving[1], 0.0)] if _has_kinks(aero) else winds
+        speed, winds = self.speed, []
+        for along, forth, aside in product((0, 1), (1, -1), (1, -1)):
+            across = 1 - along
+            c = -forth * moving[along], -aside * moving[across]
+            ahead, half = ((each + ca.sqrt(each**2 + smoothed**2)) / 4 for each in c)  # c+ / 2
+            a = ca.fmax(speed + c[0], 0.0)
+            wide = ca.fmax(speed + c[1], 0.0) + ahead
+            share = ca.sqrt(half * (2 * a + half)) / ca.fmax(a + half, TINY)  # the root of 1 - a^2 / a'^2
+            values: list[Any] = [0.0, 0.0, 0.0]
+            values[along] = forth * speed
+            values[across] = moving[across] + aside * (wide * share + ca.fmin(speed + c[1], 0.0))
+            winds.append(ca.vertcat(*values))
+        nearest = (_clipped(moving[i], -speed, speed) for i in range(2))
+        return [*winds, ca.vertcat(*nearest, 0.0)] if _has_kinks(aero) else winds
 
     def possible(self, aero: Aero, moving: np.ndarray) -> list[np.ndarray]:
         """Return winds of the disc, (n, 3) each, at velocities of the CoM (n, 3): all round, and against the motion."""
@@ -139,6 +160,10 @@ class WindDisc(Part):
 
 
 WindSet: TypeAlias = WindBox | WindDisc
+
+
+def _clipped(value: Any, low: float, high: float) -> Any:
+    return ca.fmin(ca.fmax(value, low), high)
 
 
 def _has_kinks(aero: Aero) -> bool:
