@@ -72,7 +72,7 @@ def pulls_by_thrust(
     if times is None or len(times) <= 2 * FEWEST or len(set(owner)) < len(owner) or not known[owner].all():
         return None
     gains, parabolas = thrust_gains(robot, measured, poses, thrusts), Parabolas(times, within(times))
-    notes += notes_of_gains(robot, gains)
+    notes += notes_of_gains(robot, gains, "so tensions are computed without this error")
     notes.append("tensions are computed from thrusts, weights and accelerations of the carriers")
     thrust_per_newton = {one.index: one.of(times) for one in gains}
     pulls = np.empty((len(times), len(owner), 3))

@@ -22,6 +22,8 @@ from .mapping import command_fields, read_map
 from .north_east_down import carriers_from_ned, ned_frame, note_of, platform_from_ned
 from .reading import Log, Paths, read_log
 from .streams import Reader
+from .thrust_gains import notes as notes_of_gains
+from .thrust_gains import thrust_gains
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +108,9 @@ def read_recorded(
             notes += [] if read.ned else [note_of(axis, pose)]
             pose = pose if read.ned else np.asarray(platform_from_ned(known, pose, axis))
             carrier_pose = carriers_from_ned(known, carrier_pose, axis)
+        else:
+            gains = thrust_gains(known, measured, carrier_pose, thrusts)
+            notes += notes_of_gains(known, gains, "so the replay flies with other forces")
         doubt, commanded = wrong.doubt if wrong else None, "forces" if motors else "tensions"
         return Recorded(
             robot=known,

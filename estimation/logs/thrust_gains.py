@@ -112,8 +112,8 @@ def notes_of_tilts(robot: Robot, directions: np.ndarray, pulls: np.ndarray) -> I
             )
 
 
-def notes(robot: Robot, gains: list[ThrustGain]) -> Iterator[str]:
-    """Yield a line for each gain."""
+def notes(robot: Robot, gains: list[ThrustGain], effect: str) -> Iterator[str]:
+    """Yield a line for each gain, which ends with its effect."""
     for gain in gains:
         first, last = (1 / (gain.factors[2] + gain.factors[3] * s) for s in (-0.5, 0.5))
         size = quantity(first, digits=3)
@@ -123,5 +123,5 @@ def notes(robot: Robot, gains: list[ThrustGain]) -> Iterator[str]:
         turned = f", tilted by {quantity(tilt, 'deg', 2)}," if tilt > np.degrees(LEAST) else ""
         yield (
             f"recorded thrusts of {robot.carriers[gain.index].name} are {size} times those that its mass and motion "
-            f"need across its cable{turned or ','} so tensions are computed without this error"
+            f"need across its cable{turned or ','} {effect}"
         )
