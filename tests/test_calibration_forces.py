@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
+from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
@@ -18,6 +19,7 @@ from towline.estimation.calibration.parameters import COMMON, FRAMES, GROUPS, OF
 from towline.estimation.calibration.solving import solve
 from towline.estimation.calibration.stretch import with_elasticity, with_stretch
 from towline.estimation.logs.load_cells import slack
+from towline.estimation.pose.from_log import poses_from_log
 from towline.models import Robot, load
 from towline.models.files import as_robot
 
@@ -100,6 +102,51 @@ def test_four_cables_calibrate_without_a_camera():
         ratios.append(error @ np.linalg.solve(result.covariance, error))
     assert np.median(errors) < 0.003
     assert chi2.ppf(1e-3, 14) < sum(ratios) < chi2.ppf(1 - 1e-3, 14)
+
+
+def hung(lengths):
+    """The pose in which cables of some lengths (4,) hold the platform, taut or slack: that of the lowest CoM."""
+    start = np.array([0, 0, 0.5, 0, 0, 0])
+
+    def room(pose):
+        return lengths - lines(pose)[2]
+
+    def height(pose):
+        return pose[2] + (Rotation.from_euler("xyz", pose[3:]).as_matrix() @ COM)[2]
+
+    found = minimize(height, start, method="SLSQP", constraints={"type": "ineq", "fun": room}, options={"ftol": 1e-10})
+    assert found.success
+    return found.x
+
+
+def test_slack_cables_are_no_stretch_of_the_others():
+    """Some of four cables are longer than the way to the platform, so the readings of the taut ones look too short."""
+    draw = np.random.default_rng(5)
+    places = np.column_stack([draw.uniform(-1.8, 1.8, (27, 2)), draw.uniform(0.8, 2, 27), np.zeros((27, 3))])
+    readings = np.array([lines(place)[2] for place in places])
+    poses = np.array([hung(row) for row in readings])
+    loose = readings - [lines(pose)[2] for pose in poses] > 2e-3
+    assert 10 < loose.sum() < 30
+    offsets = draw.normal(0, 0.05, 4)
+    angles = Rotation.from_rotvec(draw.normal(0, AHRS, (27, 3))) * Rotation.from_euler("xyz", poses[:, 3:])
+    seen = readings - offsets + draw.normal(0, 1e-3, (27, 4))
+    log = Measurements(seen, orientations=angles.as_euler("xyz"), sigma={"lengths": 1e-3, "rotation": AHRS})
+    result = calibrate(drawn(), log, "offsets")
+    assert result.free == ("offsets",)
+    error = np.array([one.value for one in result.parameters]) - offsets
+    assert error @ np.linalg.solve(result.covariance, error) < chi2.ppf(1 - 1e-3, 4)
+    assert "hardly pull" in str(result.report())
+
+
+def test_a_wrong_reading_of_a_hanging_platform_is_listed():
+    """Orientations and the balance of forces are redundant, although four lengths fit any pose."""
+    _, readings, angles, _, offsets = rests(0)
+    readings = readings + offsets
+    readings[7, 2] += 0.15
+    log = Measurements(readings, orientations=angles, sigma={"lengths": 1e-3, "rotation": AHRS})
+    found = poses_from_log(drawn(), log)
+    np.testing.assert_array_equal(np.flatnonzero(~found.fits), [7])
+    assert any("sample 7: no pose fits" in line for line in found.lines())
 
 
 def test_without_tensions_gravity_still_adds_two_equations():

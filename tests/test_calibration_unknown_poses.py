@@ -69,6 +69,15 @@ def test_the_truth_is_inside_the_ellipsoid(name, size, turn):
         assert turned(result.poses, poses) < 8
 
 
+def test_lengths_do_not_tell_the_size_of_a_robot_from_a_scale_of_all_readings():
+    """Readings of drums that are 2 % too small fit a robot that is smaller by 2 %: the report says so."""
+    robot = load("planar-4")
+    _, _, _, readings = a_log(robot, 0, 0.3, offsets=0.0, anchors=1e-3)
+    said = str(calibrate(robot, Measurements(readings / 1.02), ("anchors",), outliers=False).report())
+    assert "the anchors are 1.8 % closer than in the file" in said
+    assert "with --free anchors,scales --prior anchors=0.02,scales=0.02 they include errors of both" in said
+
+
 def test_anchors_out_of_the_plane_are_errors_of_offsets():
     """They lengthen cables to second order only, here by several standard deviations of the offsets."""
     robot, prior = load("planar-4"), {"anchors": 0.03, "offsets": 0.05}

@@ -18,6 +18,7 @@ from ..logs.encoders import lengths_of
 from ..logs.measurements import Measurements, measured_poses
 from ..pose.from_lengths import pose_from_lengths
 from .geometry import length_of
+from .hanging import without_slack
 from .interpretations import interpretations
 from .solving import model_of
 from .starts import fit_from
@@ -31,6 +32,7 @@ MOUNTED = np.radians(7.0)  # from right angles, of a sensor on the platform
 LIKELIER = 0.95  # of the sum of squares that a fit with the orientations as they are leaves
 SIMPLER = 2.0  # times the least sum of squares, which a simpler error may leave
 ENOUGH = 1e-3  # of the sum of squares, of a step that these fits need not take
+MOST_WRONG = 9.0  # times the median of the samples' sums of squares, up to which a sample counts
 
 
 class Misread(NamedTuple):
@@ -131,15 +133,19 @@ def _turned(given: Measurements, rotation: Rotation) -> Measurements:
 def _fitted(robot: Robot, given: Measurements) -> tuple[float, dict[str, np.ndarray]]:
     """Return the sum of squares with offsets and the CoM fitted, and the turns from the measured orientations.
 
-    The turns are those of the world and of the sensor, in the axes of each, (n, 3) [rad].
+    The turns are those of the world and of the sensor, in the axes of each, (n, 3) [rad]. Samples that fit far worse
+    than most count only up to a limit, as wrong readings should not decide.
     """
     few = np.unique(np.linspace(0, len(given) - 1, min(len(given), MOST_FITTED)).astype(int))
     groups = ("offsets", "com") if robot.m < robot.dof_mask.sum() else ("offsets",)
     model = model_of(robot, given.only(np.isin(np.arange(len(given)), few)), groups, {})
-    found = fit_from(model, model.begin(), length_of(robot), enough=ENOUGH)[0]
+    found, model = fit_from(model, model.begin(), length_of(robot), enough=ENOUGH)
+    model, found = without_slack(model, found, length_of(robot))
+    squares = model.residuals(found.state).of_samples
+    cost = float(np.minimum(squares, MOST_WRONG * np.median(squares)).sum())
     turns = Rotation.from_matrix(found.state.turn).as_rotvec()
     seen = Rotation.from_matrix(model.poses(found.state)[1])  # a turn is the same in the axes that it leads to
-    return found.cost, {"world": turns, "sensor": seen.inv().apply(turns)}
+    return cost, {"world": turns, "sensor": seen.inv().apply(turns)}
 
 
 def _rest(robot: Robot, given: Measurements, rotation: Rotation, frame: str, up: np.ndarray) -> Rotation:

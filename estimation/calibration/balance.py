@@ -29,6 +29,7 @@ from .parameters import Parameters
 
 OWN = 2e-3  # of the weight: standard deviation of forces that the model lacks
 NOISY = 2.0  # times the stated standard deviations, of the noise that tensions of a motion show
+HARDLY = 0.1  # of the mean tension, that of cables which hardly pull
 LEAST_TENSION = 0.1  # of a cable's mean: relative errors of smaller tensions are not smaller
 UNMEASURED = 3.0  # times the weight or the largest mean tension: standard deviation of one that was not measured
 MOST_CAPSTAN = 30.0  # of which exp is no overflow
@@ -138,6 +139,7 @@ class Balance:
     def __init__(self, robot: Robot, measurements: Measurements):
         self._robot, self._measurements = robot, measurements
         self._log, self._chosen = _Log(robot, measurements), np.arange(len(measurements))
+        self._slack = np.zeros((len(measurements), robot.m), dtype=bool)
         self._rows = np.flatnonzero(robot.dof_mask)
         self._scale = robot.wrench_scale[self._rows]
 
@@ -145,6 +147,12 @@ class Balance:
         """Return the balance at some samples (k,), whose motion is that of the whole log."""
         other = copy(self)
         other._chosen = self._chosen[rows]
+        return other
+
+    def with_slack(self, slack: np.ndarray) -> Balance:
+        """Return the balance of a log without measured tensions, some of whose cables, (N, m) of bool, hardly pull."""
+        other = copy(self)
+        other._slack = slack
         return other
 
     @property
@@ -166,7 +174,7 @@ class Balance:
     @property
     def equations(self) -> np.ndarray:
         """Return the number of equations of each sample beside those that tensions without measurement take, (N,)."""
-        return np.maximum(len(self._rows) - self._log.lost[self._chosen].sum(axis=1), 0)
+        return np.maximum(len(self._rows) - (self._log.lost & ~self._slack)[self._chosen].sum(axis=1), 0)
 
     def tensions(self, table: np.ndarray, smooth: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Return the tensions that the platform feels [N], (N, m), with derivatives.
@@ -197,7 +205,9 @@ class Balance:
         (tensions, by_tensions), variances = self.tensions(table), noise**2 * self._log.variances[self._chosen]
         motion = self._log.motion.ahead(self._measurements.times, clock, self._chosen)
         if self._measurements.tensions is None:
-            tensions = tensions + robot.weight / m
+            slack, usual = self._slack[self._chosen], robot.weight / m
+            tensions = np.where(slack, 0.0, tensions + usual)
+            variances = np.where(slack, (noise * HARDLY * usual) ** 2, variances)
         arm = rotation @ com
         pull = motion.gravity + (motion.by_arm @ arm[..., None])[..., 0]
         force = mass * pull

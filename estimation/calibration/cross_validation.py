@@ -17,11 +17,11 @@ from ..logs.measurements import Measurements
 from .balance import hangs, needs_balance
 from .fit import fit
 from .geometry import length_of
+from .hanging import carrying
 from .model import Model, State
 from .parameters import IN_BALANCE, Parameters
 from .solving import (
     Solved,
-    carrying,
     check_enough,
     cleaned,
     covariance_of,

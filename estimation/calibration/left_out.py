@@ -6,12 +6,12 @@ from ...models.dynamics import dynamics_of
 from ...models.robot import Robot
 from ..logs.load_cells import SAME, slack
 from ..logs.measurements import Measurements, carriers_of, tracked
-from .balance import hangs
+from .balance import HARDLY, hangs
 from .differences import PLAUSIBLE
 from .geometry import length_of
 from .parameters import Parameters
 
-HARDLY = 0.1  # of the mean tension
+SLACK = "cables that hardly pull, which may be slack"
 MOST_SLACK = 0.5  # of a cable's samples; more seem slack if the file or the poses are wrong
 CHUNK = 10_000  # samples
 
@@ -19,7 +19,7 @@ CHUNK = 10_000  # samples
 def left_out(robot: Robot, measurements: Measurements) -> dict[str, np.ndarray]:
     """Return which readings no fit uses, (N, m) of bool, by the reason."""
     return {
-        "cables that hardly pull, which may be slack": slack(robot, measurements) | _loose(robot, measurements),
+        SLACK: slack(robot, measurements) | _loose(robot, measurements),
         "encoders that stand still while their cables move": _still(robot, measurements),
     }
 
@@ -59,12 +59,22 @@ def _loose(robot: Robot, measurements: Measurements) -> np.ndarray:
         return result
     if np.isnan(measurements.poses[known][:, axes]).any():
         return result
+    tensions = list[np.ndarray]()
     for rows in np.array_split(np.flatnonzero(known), len(known) // CHUNK + 1):
         poses, carriers = _poses(robot, measurements, rows)
         A = np.asarray(dynamics_of(robot).wrench_matrix(poses, carriers))[:, axes] * robot.wrench_scale[axes, None]
         wrench = np.asarray(dynamics_of(robot).required_wrench(poses, 0 * poses, 0 * poses))[:, axes]
-        tensions = (np.linalg.pinv(A) @ (wrench * robot.wrench_scale[axes])[..., None])[..., 0]
-        result[rows] = tensions < HARDLY * np.abs(tensions).mean()
+        tensions.append((np.linalg.pinv(A) @ (wrench * robot.wrench_scale[axes])[..., None])[..., 0])
+    result[known] = hardly_pull(np.concatenate(tensions))
+    return result
+
+
+def hardly_pull(tensions: np.ndarray) -> np.ndarray:
+    """Return which cables hardly pull, or would have to push, (N, m) of bool, by their tensions (N, m) [N].
+
+    None is one of a cable that seems to do so in most samples.
+    """
+    result = tensions < HARDLY * np.abs(tensions).mean()
     return np.asarray(result & (result.mean(axis=0) < MOST_SLACK))
 
 

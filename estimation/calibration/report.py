@@ -12,9 +12,10 @@ from ...models.parsing import to_yaml
 from .balance import hangs
 from .file_errors import ENDS
 from .geometry import length_of
-from .left_out import left_out
+from .hanging import slack
+from .left_out import SLACK, left_out
 from .parameters import GROUPS
-from .result import CalibrationData, Parameter
+from .result import CalibrationData, Parameter, apart
 from .solving import is_still
 from .turning import turning
 
@@ -141,6 +142,13 @@ def _of_noise(result: CalibrationData) -> list[str]:
             f"{why}the standard deviations below hold only if the file's {kept[0]} are exact; with --free {free} "
             f"--prior {kept[0]}=0.02 they include errors of 20 mm"
         )
+    if result.growth is not None:
+        free = ",".join(name for name in GROUPS if name in ("scales", *result.free))
+        lines.append(
+            f"the anchors are {apart(result.growth)} than in the file, which lengths without positions do not "
+            "distinguish from a scale of all readings: the standard deviations below hold only if the file's scales "
+            f"are exact; with --free {free} --prior anchors=0.02,scales=0.02 they include errors of both"
+        )
     turns = turning(result.file, result.measurements) if "attachments" in result.free else None
     if turns is not None and not turns.enough:
         by = quantity(np.degrees(turns.angle), "deg", 2)
@@ -198,8 +206,10 @@ def _of_exceptions(result: CalibrationData) -> list[str]:
         f"{'longer' if slip.size > 0 else 'shorter'} than its reading (+- {_mm(slip.sigma)})"
         for slip in result.slips
     ]
+    model = result._solved.model
+    slack_there = (slack(model, result._solved.fit.state) & ~model.weights).T
     for why, which in left_out(result.file, result.measurements).items():
-        count = which.sum(axis=0)
+        count = (which | slack_there * (why == SLACK)).sum(axis=0)
         if count.any():
             named = ", ".join(f"cables[{i}] ({count[i]})" for i in np.flatnonzero(count))
             lines.append(f"left out: readings of {why}: {named}")

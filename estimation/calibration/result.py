@@ -44,6 +44,11 @@ class Parameter(NamedTuple):
     unit: str
 
 
+def apart(growth: float) -> str:
+    """Return how much farther apart anchors are, in per cent."""
+    return f"{quantity(100 * abs(growth), digits=2)} % {'farther apart' if growth > 0 else 'closer'}"
+
+
 @dataclass(frozen=True, eq=False)
 class CalibrationData(Displayed):
     """The result of `calibrate`, without figures, files and reports.
@@ -82,8 +87,9 @@ class CalibrationData(Displayed):
         """Return why `save` and `towline calibrate` do not write the robot, in one line; None if they do.
 
         The log probably has an input error, the fit did not converge, an end of a cable or the CoM would move by more
-        than half of the cables' length (3 % if winches are locked), residuals exceed 3 % of it, a third of the readings
-        are outliers, the mass changes, or validation samples fit worse than with the file's robot.
+        than half of the cables' length (3 % if winches are locked), the anchors of a robot without measured positions
+        would be 3 % farther apart or closer, residuals exceed 3 % of the cables' length, a third of the readings are
+        outliers, the mass changes, or validation samples fit worse than with the file's robot.
         """
         if self.doubt is not None:
             return self.doubt
@@ -115,15 +121,36 @@ class CalibrationData(Displayed):
 
     @cached_property
     def undetermined(self) -> str | None:
-        """Return which end of a cable, or the CoM, would move too far to be real, in one line, or None."""
+        """Return which end of a cable, the CoM, or all anchors would move too far to be real, in one line, or None."""
         ends = (one for one in self.parameters if ".a" in one.name or one.name.startswith("com"))
         far, length = max(ends, key=lambda one: abs(one.correction), default=None), length_of(self.file)
+        if self.growth is not None and abs(self.growth) > PLAUSIBLE:
+            return (
+                "lengths without positions do not determine the size of the robot: its anchors would be "
+                f"{apart(self.growth)}; give a prior"
+            )
         still = is_still(self.measurements) and self.measurements.carrier_poses is None
         if far is None or abs(far.correction) <= (PLAUSIBLE if still else FARTHEST) * length:
             return None
         by, of = (quantity(size, "m", digits=3) for size in (abs(far.correction), length))
         hint = "; the readings hardly change: try --free offsets, or give a prior" if still else ""
         return f"the log does not determine {far.name}: it would move by {by}, and cables are {of} long{hint}"
+
+    @cached_property
+    def growth(self) -> float | None:
+        """Return by which share the anchors are farther apart than in the file if lengths do not determine it, or None.
+
+        Without positions, a scale of all readings would explain it as well. A prior of the anchors tells.
+        """
+        of, state = self._solved.model, self._solved.fit.state
+        named = "anchors" in self.free and "scales" not in self.free and "anchors" not in self.prior
+        if not (named and of.size_is_open and of.measurements.carrier_poses is None):
+            return None
+        turned, placed = of.parameters.carriers
+        tables = (of.parameters.table(x) for x in (of.parameters.first, state.x))
+        ends = (placed + np.einsum("mij,mj->mi", turned, table[:, :3]) for table in tables)
+        before, after = (float(np.linalg.norm(one - one.mean(axis=0))) for one in ends)
+        return after / before - 1 if before else None
 
     @property
     def means_something(self) -> bool:

@@ -12,12 +12,13 @@ from ..logs.cable_directions import placed
 from ..logs.measurements import Measurements, measured, measured_poses, tracked
 from ..logs.pose_track import PoseTrack
 from .autocorrelation import information_of
-from .balance import Balance, FeltTensions, hangs
+from .balance import Balance, hangs
 from .carrier_clocks import CarrierClocks, has_carrier_clocks, with_carrier_clocks
 from .carrier_motion import CarrierMotion
 from .clock import CLOCK_RANGE, begin_with_clock, moves_smoothly
 from .fit import Fit, fit
 from .geometry import length_of
+from .hanging import carrying, without_slack
 from .left_out import left_out
 from .model import Model, State
 from .normal_equations import metric
@@ -122,6 +123,7 @@ def solve(
     result, used = fit_from(model, state, length, outliers)
     model, fitted = replace(model, kept=used.kept), used.weights
     model, result = _weighed(model, result, length, False)
+    model, result = without_slack(model, result, length)
     clocks: CarrierClocks | None = None
     if has_carrier_clocks(robot, measurements):
         model, result, clocks = with_carrier_clocks(model, result, measurements, None, length)
@@ -246,20 +248,6 @@ def _stretched(model: Model, state: State, length: float) -> Model:
     moved = np.sqrt((((felt.tensions - known.tensions) * by_newtons) ** 2).mean(axis=0)).max()
     same = felt.errors.shape == known.errors.shape and moved <= NEGLIGIBLE
     return model if same else replace(model, felt=felt)
-
-
-def carrying(model: Model, state: State) -> FeltTensions | None:
-    """Return the tensions of a platform that `hangs` at a state of the whole log, None for other logs.
-
-    They are smoothed, as noise of the poses, which lengths have as well, would look like stretch.
-    """
-    if model.forces is None or not hangs(model.robot, model.measurements):
-        return None
-    tensions = np.zeros((len(model.measurements), model.robot.m))
-    for rows, part, own in model.parts(state):
-        assert part.forces is not None
-        tensions[rows] = part.forces.carrying(part.parameters, own.x, part.poses(own), part.ahead)
-    return FeltTensions(model.forces.smoothed(tensions), np.zeros((*tensions.shape, 0)))
 
 
 def model_of(

@@ -19,6 +19,7 @@ from ..pose.from_lengths import pose_from_lengths
 from ..pose.problem import problem_of
 from ..pose.search import level_platform
 from .fit import Fit, fit
+from .hanging import slack
 from .model import Model, State
 from .outliers import robust
 from .pose_noise import steadied
@@ -56,7 +57,8 @@ def fit_from(
     state = _by_forces(model, state, length)
     rough, begin = _rough(model, state, length)
     state, weights = cleaned(rough, fit(rough, begin, length, enough=ENOUGH).state)
-    clean = replace(model, weights=weights)
+    taut = model.weights * ~slack(rough, state) if outliers else model.weights
+    model, clean = replace(model, weights=taut), replace(model, weights=weights * taut)
     clean, state = steadied(clean, _elsewhere(clean, state) or state, length)
     softest = (rough.measurements.sigma.lengths / model.measurements.sigma.lengths) ** 2
     state, weights = cleaned(replace(clean, weights=model.weights), state, softest)

@@ -11,10 +11,11 @@ import numpy as np
 from .balance import Balance, FeltTensions, hangs
 from .fit import held
 from .geometry import length_of
+from .hanging import carrying
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
 from .parameters import COMMON, GROUPS
-from .solving import Solved, carrying, covariance_of, noise_of
+from .solving import Solved, covariance_of, noise_of
 from .turning import turning
 
 POSSIBLE, CERTAIN = 3.0, 4.0  # standard deviations of a compliance: of independent errors, and of all

@@ -91,8 +91,9 @@ class LogPoses(Displayed):
 
     @property
     def fits(self) -> np.ndarray:
-        """Return which samples are fitted by a pose, (N,) of bool; without redundant cables, all that converged."""
-        return np.asarray(self.estimate.converged & (~(self.cost > self.largest) | self.estimate.by_gravity))
+        """Return which samples are fitted by a pose, (N,) of bool; without redundant readings, all that converged."""
+        untested = np.asarray(self.estimate.by_gravity) & (self.squares is None)
+        return np.asarray(self.estimate.converged & (~(self.cost > self.largest) | untested))
 
     @cached_property
     def wrong(self) -> tuple[Wrong, ...]:
@@ -281,6 +282,7 @@ def _block(robot: Robot, measured: Measurements, weights: np.ndarray) -> tuple[n
 
     Covariances are those by noise, and by the file's `uncertainty`, (k, 6, 6).
     """
+    from ..calibration.hanging import without_slack
     from ..calibration.normal_equations import pose_covariances, pose_covariances_by_file
     from ..calibration.solving import lengths_of as lengths_left
     from ..calibration.solving import model_of
@@ -288,7 +290,8 @@ def _block(robot: Robot, measured: Measurements, weights: np.ndarray) -> tuple[n
 
     model = model_of(robot, measured, (), {})
     model = replace(model, weights=np.repeat(weights[:, None], len(measured), axis=1))
-    found = fit_from(model, model.begin(), length_of(robot))[0]
+    length = length_of(robot)
+    model, found = without_slack(model, fit_from(model, model.begin(), length)[0], length)
     position, rotation = model.poses(found.state)
     return (
         np.hstack([position, points.angles(rotation)]),
