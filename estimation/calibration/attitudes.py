@@ -60,13 +60,13 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
     rows, expected = rows[good], Rotation.from_matrix(points.rotations(estimate.pose[good, 3:]))
     tried: list[tuple[float, float, str, Rotation, Rotation, int]] = []
     none, up = Rotation.identity(), -np.array(robot.gravity) / max(np.linalg.norm(robot.gravity), 1e-12)
-    spread = float(np.median((expected * expected.mean().inv()).magnitude()))
+    right_angles, spread = Rotation.create_group("O"), float(np.median((expected * expected.mean().inv()).magnitude()))
     ways = [way for way in interpretations(True) if way.turned is not None or not way.text]
     for k, way in enumerate(ways):
         R = rotation[rows] if way.turned is None else way.turned(rotation[rows], given.poses[rows, 3:])
         seen = Rotation.from_matrix(R)
         outer, inner = (expected * seen.inv()).mean(), (seen.inv() * expected).mean()
-        nearest = min(Rotation.create_group("O"), key=lambda one, inner=inner: (one.inv() * inner).magnitude())
+        nearest = right_angles[int(np.argmin((right_angles.inv() * inner).magnitude()))]
         # Sensors are mounted at right angles; a wrong CoM tilts the platform, too.
         inner = nearest if (nearest.inv() * inner).magnitude() < MOUNTED else inner
         heading = Rotation.from_rotvec(2 * np.arctan2(up @ outer.as_quat()[:3], outer.as_quat()[3]) * up)

@@ -23,6 +23,7 @@ FEW, MANY = 6, 60  # steps of a first and of a last descent
 KEPT = 8  # starts that are worth a last descent
 MOST_SAMPLES = 60
 SIMPLER = 1.3  # times the size of the residuals that one transform instead of two may have
+AS_WELL = 1.25  # times the size of the residuals before
 MUCH_BETTER = 2.0  # times smaller residuals, in another convention of angles
 DAMPING, ROUNDING = 1e-3, 1e-14
 
@@ -67,9 +68,16 @@ NONE = (np.zeros(3), np.eye(3))
 BOTH = (True, True)
 
 
-def fitted_frames(log: LogPart) -> Frames:
-    """Return the frames that fit the lengths of a log best: one if it fits nearly as well as both."""
+def fitted_frames(log: LogPart, near: Frames | None = None, noise: float = 0.0) -> Frames:
+    """Return the frames that fit the lengths of a log best: one if it fits nearly as well as both.
+
+    Only those near some others are looked for if they fit about as well as these did, or up to the noise [m].
+    """
     few = _few(log)
+    if near is not None:
+        found = _simplest(few, _descended(few, [near], BOTH, MANY)[0])
+        if found.size <= max(AS_WELL * near.size, noise):
+            return found
     tried = sorted(_descended(few, _starts(few), BOTH, FEW), key=lambda one: one.size)[:KEPT]
     return _simplest(few, min(_descended(few, tried, BOTH, MANY), key=lambda one: one.size))
 
@@ -126,14 +134,12 @@ def _starts(few: LogPart) -> list[Frames]:
 def in_convention(log: LogPart, frames: Frames) -> tuple[Frames, Interpretation]:
     """Return frames with the convention of angles in which they fit a log much better, or these if there is none."""
     few, home = _few(log), points.rotations(log.robot.home[3:])
-    tried: list[tuple[float, Interpretation]] = []
-    for way in interpretations(True):
-        if way.turned is not None and way.placed is AS_GIVEN.placed:
-            rotation = few.at(way)[1]
-            inner = (frames.outer[1] @ Rotation.from_matrix(rotation).mean().as_matrix()).T @ home
-            start = Frames(frames.outer, (np.zeros(3), inner))
-            tried.append((_descended(few._replace(rotation=rotation), [start], BOTH, FEW)[0].size, way))
-    way = min(tried, key=lambda one: one[0])[1]
+    ways = [way for way in interpretations(True) if way.turned is not None and way.placed is AS_GIVEN.placed]
+    rotations = np.stack([few.at(way)[1] for way in ways])
+    means = [Rotation.from_matrix(rotation).mean().as_matrix() for rotation in rotations]
+    starts = [Frames(frames.outer, (np.zeros(3), (frames.outer[1] @ mean).T @ home)) for mean in means]
+    tried = _descended(few._replace(rotation=rotations), starts, BOTH, FEW)
+    way = min(zip(tried, ways, strict=True), key=lambda one: one[0].size)[1]
     found = fitted_frames(log._replace(rotation=log.at(way)[1]))
     return (found, way) if MUCH_BETTER * found.size < frames.size else (frames, AS_GIVEN)
 
@@ -170,8 +176,9 @@ def _simplest(log: LogPart, both: Frames) -> Frames:
 def _descended(log: LogPart, starts: Sequence[Frames], which: tuple[bool, bool], steps: int) -> list[Frames]:
     """Return frames after some Levenberg-Marquardt steps from S starts, all at once.
 
-    Their size is the median of the residuals' sizes.
+    Their size is the median of the residuals' sizes. The log's rotations may be others for each start, (S, N, 3, 3).
     """
+    rotations = np.broadcast_to(log.rotation, (len(starts), *log.rotation.shape[-3:]))
     columns, damping = slice(6 * (not which[0]), 12 - 6 * (not which[1])), np.full(len(starts), DAMPING)
     frames = [np.stack(part) for part in zip(*((*one.outer, *one.inner) for one in starts), strict=True)]
     now, going = _residuals(log, frames), np.arange(len(starts))
@@ -185,7 +192,7 @@ def _descended(log: LogPart, starts: Sequence[Frames], which: tuple[bool, bool],
         inverse = np.linalg.pinv(H, ROUNDING, hermitian=True)  # no step where a robot cannot move
         step[:, columns] = -(inverse @ (e[:, None] @ weighted).swapaxes(1, 2))[..., 0]
         tried = _moved([part[going] for part in frames], step)
-        after = _residuals(log, tried)
+        after = _residuals(log._replace(rotation=rotations[going]), tried)
         better = np.abs(after[0]).mean(axis=1) < np.abs(e).mean(axis=1)
         for kept, new in zip((*frames, *now), (*tried, *after), strict=True):
             kept[going[better]] = new[better]

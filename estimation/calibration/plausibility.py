@@ -126,15 +126,14 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     orders = () if not far or not framed or len(log.y) < FEWEST[1] else [(order, 0)] if still else _orders(log)
     for first, rivals in orders:
         log = given_order._replace(y=given_order.y[:, first])
-        part, read = log, AS_GIVEN
+        part, read, frames = log, AS_GIVEN, None
         for step in range(1 if still else LAST_STEP + 1):
             part = part._replace(counted=step == 1)
-            if step < 2:
-                frames, read = fitted_frames(part), AS_GIVEN
-                if turns and frames.size > FAR * noise:
-                    frames, read = in_convention(part, frames)
-            else:  # with scales that are known, the frames are found more exactly
-                frames = fitted_frames(part)
+            # With scales that are known, the frames are near those before, and found more exactly.
+            frames = fitted_frames(part, frames if step > 1 else None, FAR * noise)
+            read = AS_GIVEN if step < 2 else read
+            if step < 2 and turns and frames.size > FAR * noise:
+                frames, read = in_convention(part, frames)
             moved = frames.of(whole.position, whole.at(read)[1])
             placed = frames.of(log.position, log.at(read)[1])
             there, left = log._replace(position=placed[0], rotation=placed[1]).sound()
@@ -146,6 +145,8 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
             if step:
                 others = (one for one in _explanations(there, left[:, : len(there.y)], noise)[0] if one.way.of_readings)
                 way = min(others, default=way, key=lambda one: one.weighted)
+            if step and frames.size > FAR * EXPLAINED * change * way.way.factor:  # with any scales
+                break
             left_before, factors = min(as_given, best.size * best.way.factor), way.signs * way.way.factor
             if step and step < LAST_STEP:
                 part = log._replace(y=log.y[:, way.columns] * factors, rotation=log.at(read)[1])
