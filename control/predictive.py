@@ -57,8 +57,8 @@ class Predictive(ComputedTorque):
     The velocity that the model predicts for the commands is compared with the measured one (control/watch.py). This
     `ComputedTorque` takes over until `reset` ("not as modelled") if a tenth of the weight, in addition to the noise of
     `sensors`, is unexplained over about 50 ms, if there is no solution for that long, if noise of the velocity requires
-    more tension than the limits permit, if carriers turn with too much lag (core/control/turning.c), or if a pitch goes
-    beyond 1.5 rad. It controls the robot from the start, with a warning, if the loop is unstable at home because
+    more tension than the limits permit, if carriers turn too late (core/control/turning.c), or if a pitch goes beyond
+    1.5 rad. It controls the robot from the start, with a warning, if the loop is unstable at home because
     carriers turn before they accelerate, as with cables that begin below their CoM.
 
     Args:
@@ -276,7 +276,7 @@ class Predictive(ComputedTorque):
         command = self._command(tensions, answered, proof, alone=True)
         self._beside._agree(self)
         if self._turning is not None and (lag := self._turning["lag"][0]):
-            self.handed_over = HandOver(time, f"{LATE}, here {1e3 * lag:.0f} ms of {2e3 / self._turned:.0f}")
+            self.handed_over = HandOver(time, f"{LATE} {1e3 * lag:.0f} ms of {2e3 / self._turned:.0f}")
         return command._replace(unexplained=unexplained)
 
     def _compare(self, time: float, dt: float, reference: Reference) -> None:

@@ -11,7 +11,7 @@ BOUND = 0.1  # of the usual acceleration: the mean that is not predicted and per
 UNSTABLE = (
     "small errors at home grow under predictive control, whose model omits that carriers turn before they accelerate"
 )
-LATE = "carriers turn with so much lag that their attitude loop is nearly unstable"
+LATE = "carriers turn so late, by lag or delay, that their attitude loop is nearly unstable, as with a lag of"
 STEEP = "the platform pitches beyond 1.5 rad, where no linear model of its angles is right"
 LOUD = "noise of the measured rates requires more than the tension limits permit: lower bandwidth and observer"
 WINDOW, PAUSE = 0.05, 0.21  # [s]: in which a motion is compared, at least, and at most between two steps
