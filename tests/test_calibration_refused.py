@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from towline.base.errors import InputError
-from towline.estimation.calibration import Measurements, calibrate, plausibility
+from towline.estimation.calibration import Measurements, calibrate, explanations
 from towline.estimation.calibration.plausibility import mistake
 from towline.models import Dynamics, load, points
 
@@ -212,7 +212,7 @@ def test_conventions_of_angles_that_cannot_be_told_apart(name, seed):
 def test_a_good_log_is_read_in_one_way(monkeypatch):
     """The check costs little where lengths and poses agree as well as was stated."""
     robot, poses, readings = a_log("cogiro", 0)
-    monkeypatch.setattr(plausibility, "interpretations", None)
+    monkeypatch.setattr(explanations, "interpretations", None)
     assert doubt(robot, Measurements(readings, poses)) is None
 
 
