@@ -46,13 +46,13 @@ def lines(pose, anchors=ANCHORS, attachments=ATTACHMENTS):
     return along / lengths[:, None], arms, lengths
 
 
-def at_rest(position):
-    """A pose in which four cables hold the platform at a position, and their tensions."""
+def at_rest(position, taut=(1, 1, 1, 1)):
+    """A pose in which four cables, or those that are taut, hold the platform at a position, and their tensions."""
 
     def out_of_balance(z):
         u, arms, _ = lines(np.concatenate([position, z[:3]]))
         com = Rotation.from_euler("xyz", z[:3]).as_matrix() @ COM
-        pulls = z[3:, None] * MASS * 9.81 * u
+        pulls = (taut * z[3:])[:, None] * MASS * 9.81 * u
         moments = np.cross(arms, pulls).sum(axis=0) + np.cross(com, MASS * GRAVITY)
         return np.concatenate([pulls.sum(axis=0) + MASS * GRAVITY, moments])
 
@@ -63,7 +63,7 @@ def at_rest(position):
         z = z - np.linalg.pinv(slope) @ now
     assert np.abs(out_of_balance(z)).max() < 1e-5
     assert z[3:].min() > 0
-    return np.concatenate([position, z[:3]]), z[3:] * MASS * 9.81
+    return np.concatenate([position, z[:3]]), taut * z[3:] * MASS * 9.81
 
 
 @cache
@@ -147,6 +147,23 @@ def test_a_wrong_reading_of_a_hanging_platform_is_listed():
     found = poses_from_log(drawn(), log)
     np.testing.assert_array_equal(np.flatnonzero(~found.fits), [7])
     assert any("sample 7: no pose fits" in line for line in found.lines())
+
+
+@pytest.mark.parametrize("by_file", [False, True])
+def test_errors_of_fixed_attachments_are_part_of_what_is_weighed(by_file):
+    """Files whose attachments are wrong by what they state, or by the usual error: mass and CoM of many such files."""
+    poses, readings, _, tensions, _ = rests(0)
+    draw, size, errors = np.random.default_rng(3), 8e-3 if by_file else 4e-3, []  # 0.1 % of cables of 4 m
+    names = [f"cables[{i}].{end}.{axis}" for i in range(4) for end in ("anchor", "attachment") for axis in "xyz"]
+    stated = {"parameters": names, "covariance": np.diag(np.tile([1e-12] * 3 + [size**2] * 3, 4)).tolist()}
+    log = Measurements(readings, poses=poses, tensions=tensions, sigma={"lengths": 1e-3, "tensions": 0.02})
+    for _ in range(5):
+        robot = robot_file(ANCHORS, ATTACHMENTS + draw.normal(0, size, (4, 3)), COM, MASS, [0, 0, 1.4, 0, 0, 0])
+        robot = Robot.model_validate(robot.model_dump() | {"uncertainty": stated}) if by_file else robot
+        found = calibrate(robot, log, ("anchors", "offsets", "mass", "com"), prior={"anchors": 1e-6})
+        error = np.array([one.value for one in found.parameters[-4:]]) - [MASS, *COM]
+        errors.append(error @ np.linalg.solve(found.covariance[-4:, -4:], error))
+    assert chi2.ppf(1e-3, 20) < sum(errors) < chi2.ppf(1 - 1e-3, 20)
 
 
 def test_without_tensions_gravity_still_adds_two_equations():
@@ -310,6 +327,8 @@ def test_stretch_of_cables_is_found_by_the_weight_that_hangs_from_them():
         assert not is_found or abs(again.parameters[-1].value - 2e-5) < 3 * elastic.sigma
     with pytest.raises(InputError, match=r"known throughout a motion to estimate elasticity .* 280 of 300"):
         calibrate(robot, again.measurements, free=("anchors", "offsets", "elasticity"))
+    with pytest.raises(InputError, match="times must be given to estimate elasticity, got none, and the poses look"):
+        calibrate(robot, log.changed(times=None), free=("anchors", "offsets", "elasticity"))
     stiff = robot.model_copy(
         update={"cables": tuple(one.model_copy(update={"stiffness": 1e5}) for one in robot.cables)}
     )
@@ -317,6 +336,30 @@ def test_stretch_of_cables_is_found_by_the_weight_that_hangs_from_them():
     by_both = 1 / more.robot.cables[0].stiffness
     assert abs(by_both - 2e-5) < 3 * more.parameters[-1].sigma
     assert f"1 / (E A) is {1e6 * by_both - 10:.2f} 1/MN more, +-" in str(more.report())
+
+
+def test_cables_are_slack_by_the_weight_of_a_body_whose_com_is_wrong_in_the_file():
+    """The CoM decides how four cables share the weight, so which of them are slack, and how far the others stretch."""
+    draw = np.random.default_rng(0)
+    places = draw.uniform([-1, -1, 0.8], [1, 1, 2.0], (60, 3))
+    taut, farthest = np.ones((60, 4)), np.argmin(places[:, :2] @ CORNERS.T, axis=1)
+    taut[np.arange(0, 60, 3), farthest[::3]] = 0.0  # three cables can hold what is between them
+    both = [at_rest(*one) for one in zip(places, taut, strict=True)]
+    poses, tensions = (np.array(part) for part in zip(*both, strict=True))
+    lengths = np.array([lines(pose)[2] for pose in poses]) / (1 + 1e-4 * tensions)
+    readings = lengths + (1 - taut) * draw.uniform(0.005, 0.05, (60, 4)) + draw.normal(0, 3e-4, (60, 4)) + 0.1
+    anchors, ends = (one + draw.normal(0, size, (4, 3)) for one, size in ((ANCHORS, 0.03), (ATTACHMENTS, 2e-3)))
+    robot = robot_file(anchors, ends, COM + np.array([0.03, 0.02, 0]), MASS, [0, 0, 1.4, 0, 0, 0])
+    sigma = {"lengths": 3e-4, "position": 3e-4, "rotation": 3e-4}
+    found = calibrate(robot, Measurements(readings, poses=poses + draw.normal(0, 3e-4, (60, 6)), sigma=sigma))
+    assert {"elasticity", "com"} <= set(found.free)
+    assert not (found._solved.model.weights.T & (taut == 0)).any()
+    assert np.abs(found.robot.platform.com - COM)[:2].max() < 3e-3
+    assert found.robot.cables[0].stiffness == pytest.approx(1e4, rel=0.1)
+    away = np.array([cable.anchor for cable in found.robot.cables]) - ANCHORS
+    assert np.linalg.norm(away, axis=1).max() < 0.02  # 90 mm and more with the CoM of the file
+    sigmas = [one.sigma for one in found.parameters if ".anchor." in one.name]
+    assert np.abs(away.ravel() / sigmas).max() < 3.5
 
 
 def test_blocks_of_a_long_log_show_stretch_as_all_samples_do(monkeypatch):

@@ -16,12 +16,26 @@ MOST_SLACK = 0.5  # of a cable's samples; more seem slack if the file or the pos
 CHUNK = 10_000  # samples
 
 
-def left_out(robot: Robot, measurements: Measurements) -> dict[str, np.ndarray]:
-    """Return which readings no fit uses, (N, m) of bool, by the reason."""
+def left_out(robot: Robot, measurements: Measurements, carried: np.ndarray | None = None) -> dict[str, np.ndarray]:
+    """Return which readings no fit uses, (N, m) of bool, by the reason.
+
+    `carried` are tensions (N, m) [N] of a platform that `hangs`, from a fit; default: those by the file, at rest.
+    """
+    loose = hardly_pull(_at_rest(robot, measurements) if carried is None else carried)
     return {
-        SLACK: slack(robot, measurements) | _loose(robot, measurements),
+        SLACK: slack(robot, measurements) | loose,
         "encoders that stand still while their cables move": _still(robot, measurements),
     }
+
+
+def hardly_pull(tensions: np.ndarray) -> np.ndarray:
+    """Return which tensions (N, m) [N] are so small, or negative, that the cable may be slack, (N, m) of bool.
+
+    None of a cable are if too many would be, nor are those that are nan.
+    """
+    known = tensions[np.isfinite(tensions)]
+    result = tensions < HARDLY * (np.abs(known).mean() if known.size else 0.0)
+    return np.asarray(result & (result.mean(axis=0) < MOST_SLACK))
 
 
 def _still(robot: Robot, measurements: Measurements) -> np.ndarray:
@@ -48,34 +62,20 @@ def _still(robot: Robot, measurements: Measurements) -> np.ndarray:
     return result
 
 
-def _loose(robot: Robot, measurements: Measurements) -> np.ndarray:
-    """Return which cables would hardly pull, or push, at measured poses of a platform at rest, (N, m) of bool.
-
-    Unless tensions were measured, the platform hangs from so few cables that its weight determines them.
-    """
-    result, known = np.zeros(measurements.lengths.shape, dtype=bool), tracked(robot, measurements)
+def _at_rest(robot: Robot, measurements: Measurements) -> np.ndarray:
+    """Return the tensions at measured poses of a platform at rest that `hangs`, (N, m) [N], nan where unknown."""
+    result, known = np.full(measurements.lengths.shape, np.nan), tracked(robot, measurements)
     axes = np.flatnonzero(robot.dof_mask)
     if not hangs(robot, measurements) or measurements.poses is None or not known.any():
         return result
     if np.isnan(measurements.poses[known][:, axes]).any():
         return result
-    tensions = list[np.ndarray]()
     for rows in np.array_split(np.flatnonzero(known), len(known) // CHUNK + 1):
         poses, carriers = _poses(robot, measurements, rows)
         A = np.asarray(dynamics_of(robot).wrench_matrix(poses, carriers))[:, axes] * robot.wrench_scale[axes, None]
         wrench = np.asarray(dynamics_of(robot).required_wrench(poses, 0 * poses, 0 * poses))[:, axes]
-        tensions.append((np.linalg.pinv(A) @ (wrench * robot.wrench_scale[axes])[..., None])[..., 0])
-    result[known] = hardly_pull(np.concatenate(tensions))
+        result[rows] = (np.linalg.pinv(A) @ (wrench * robot.wrench_scale[axes])[..., None])[..., 0]
     return result
-
-
-def hardly_pull(tensions: np.ndarray) -> np.ndarray:
-    """Return which cables hardly pull, or would have to push, (N, m) of bool, by their tensions (N, m) [N].
-
-    None is one of a cable that seems to do so in most samples.
-    """
-    result = tensions < HARDLY * np.abs(tensions).mean()
-    return np.asarray(result & (result.mean(axis=0) < MOST_SLACK))
 
 
 def _poses(robot: Robot, measurements: Measurements, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

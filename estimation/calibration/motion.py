@@ -12,6 +12,8 @@ from ..logs.measurements import Measurements, measured_poses
 from ..logs.smoothing import FEWEST, Parabolas, continuous, widest_parabola, within
 from .parameters import Parameters
 
+FEWEST_MOVING = 50  # samples without times that can be told from poses at rest
+SMALL, SMOOTH = 0.05, 0.7  # steps of a motion over its extent, and their changes over the steps
 SLOWEST = 0.2  # [s] between samples of a motion; if they are farther apart, the platform is taken to be at rest
 
 
@@ -25,7 +27,7 @@ class Motion(NamedTuple):
         turning: Rate of the angular momentum about the CoM in {G}, (N, 3) [N m].
         sigma: Standard deviation of the acceleration, 0 where the platform rests, (N,) [m/s^2].
         smooth: Smoothing of values (N, d) by the same parabolas, None without times.
-        is_known: Whether the poses show how the platform accelerates, or it is at rest.
+        is_known: Whether the poses show how the platform accelerates, or it is at rest, also by poses without times.
     """
 
     signs: np.ndarray
@@ -62,7 +64,9 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
     count, times = len(measurements), measurements.times
     gravity, zero = np.tile(robot.gravity, (count, 1)), np.zeros((count, 3))
     rest = Motion(np.zeros((count, robot.m)), gravity, zero, zero, zero, np.zeros(count))
-    if times is None or count < 2 * FEWEST + 1 or np.median(np.diff(times)) > SLOWEST:
+    if times is None:
+        return rest._replace(is_known=not _seems_to_move(robot, measurements))
+    if count < 2 * FEWEST + 1 or np.median(np.diff(times)) > SLOWEST:
         return rest
     from scipy.special import erf
 
@@ -97,6 +101,16 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
         momentum, change = (np.einsum("nij,nj->ni", inertia, part) for part in (rate, spin))
         rest = rest._replace(turning=change + np.cross(rate, momentum))
     return rest._replace(gravity=gravity - moved.bends[:, :3], rate=rate, spin=spin, sigma=sigma)
+
+
+def _seems_to_move(robot: Robot, measurements: Measurements) -> bool:
+    """Return whether successive positions are close to each other and turn slowly, as only those of a motion do."""
+    position, _, known = measured_poses(robot, measurements)
+    if len(position) < FEWEST_MOVING or not known[:, robot.dof_mask > 0].all():
+        return False
+    steps = np.diff(position, axis=0)
+    usual, turns = (float(np.median(np.linalg.norm(one, axis=1))) for one in (steps, np.diff(steps, axis=0)))
+    return turns < SMOOTH * usual < SMOOTH * SMALL * float(np.linalg.norm(np.ptp(position, axis=0)))
 
 
 def _filled(times: np.ndarray, values: np.ndarray, known: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ from ..pose.estimate import unbounded
 from .curvature import curvature
 from .geometry import length_of
 from .model import STILL, Derivatives, Model, Residuals, State
-from .parameters import COLUMNS, IN_FILE, OF_CABLE, OF_ROBOT, Parameters
+from .parameters import COLUMNS, OF_CABLE, OF_ROBOT, Parameters
 from .products import inner
 from .sightings import SEEN
 
@@ -300,8 +300,7 @@ def pose_covariances_by_file(model: Model, state: State) -> np.ndarray:
     equations, scale = NormalEquations.at(whole, state, metric(whole)), metric(whole)
     assert equations.inverse_root is not None
     assert equations.Y is not None
-    named = {f"cables[{i}].{word}": OF_CABLE * i + k for i in range(model.robot.m) for k, word in IN_FILE.items()}
-    where = np.array([named[name] for name in uncertain.parameters])
+    where = whole.parameters.places(uncertain.parameters)
     own = np.searchsorted(np.flatnonzero(whole.parameters.varies), where)
     motions = np.swapaxes(equations.inverse_root, 1, 2)[:, :6] @ equations.Y[..., own] * scale[where]  # (N, 6, p)
     return np.asarray(motions @ uncertain.matrix @ np.swapaxes(motions, 1, 2))

@@ -115,6 +115,11 @@ class Parameters(Displayed):
         """Return the parameters of the cables, a row for each, (m, 15)."""
         return x[: self.clock].reshape(self.robot.m, OF_CABLE)
 
+    def places(self, names: Sequence[str]) -> np.ndarray:
+        """Return the indices of parameters by their names in robot files, (len(names),)."""
+        named = {f"cables[{i}].{word}": OF_CABLE * i + k for i in range(self.robot.m) for k, word in IN_FILE.items()}
+        return np.array([named[name] for name in names], dtype=int)
+
     def compliances(self, x: np.ndarray) -> np.ndarray:
         """Return 1 / (E A) of the cables, (m,) [1/N]."""
         return self.table(x)[:, 10] + x[self.clock + COMMON]

@@ -14,7 +14,7 @@ from .file_errors import ENDS
 from .geometry import length_of
 from .hanging import slack
 from .left_out import SLACK, left_out
-from .parameters import GROUPS
+from .parameters import GROUPS, IN_BALANCE
 from .result import CalibrationData, Parameter, apart
 from .solving import is_still
 from .turning import turning
@@ -135,7 +135,7 @@ def _of_noise(result: CalibrationData) -> list[str]:
     kept = [name for name in ("anchors", "offsets") if name not in result.free]
     still, uncertainty = len(kept) == 1 and is_still(result.measurements), result.file.uncertainty
     known = "frame" in result.free or (uncertainty and any(".anchor." in name for name in uncertainty.parameters))
-    if still or (kept[:1] == ["anchors"] and result.free and not known):
+    if still or (kept[:1] == ["anchors"] and not set(result.free) <= {*IN_BALANCE} and not known):
         why = "the lengths hardly change, so they do not distinguish offsets from anchors: " * still
         free = ",".join(name for name in GROUPS if name in (kept[0], *result.free))
         lines.append(
@@ -207,9 +207,10 @@ def _of_exceptions(result: CalibrationData) -> list[str]:
         for slip in result.slips
     ]
     model = result._solved.model
+    felt = model.felt if hangs(model.robot, model.measurements) else None
     slack_there = (slack(model, result._solved.fit.state) & ~model.weights).T
-    for why, which in left_out(result.file, result.measurements).items():
-        count = (which | slack_there * (why == SLACK)).sum(axis=0)
+    for why, which in left_out(model.robot, model.measurements, felt.tensions if felt else None).items():
+        count = ((which & ~model.weights.T) | slack_there * (why == SLACK)).sum(axis=0)
         if count.any():
             named = ", ".join(f"cables[{i}] ({count[i]})" for i in np.flatnonzero(count))
             lines.append(f"left out: readings of {why}: {named}")

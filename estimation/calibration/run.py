@@ -10,11 +10,13 @@ from .calibration import Calibration
 from .cross_validation import select
 from .file_errors import errors_of_file, loose
 from .geometry import length_of
-from .parameters import GROUPS, check_free, check_prior
+from .parameters import GROUPS, IN_BALANCE, check_free, check_prior
 from .plausibility import mistake
 from .solving import check_enough, solve, usual
-from .stretch import is_elastic, with_elasticity, with_stretch
+from .stretch import is_elastic, uses_slack, with_elasticity, with_stretch
 from .zeros import has_zeros, with_zeros
+
+ROUNDS_OF_SLACK = 3
 
 
 def calibrate(
@@ -69,7 +71,14 @@ def calibrate(
     first = loose(length_of(chosen), groups, priors)
     solved = solve(chosen, given, groups, first, outliers)
     forces = solved.model.forces
-    if "elasticity" in groups and given.tensions is None and forces is not None and not forces.motion_is_known:
+    of_forces = [name for name in groups if name in (*IN_BALANCE, "elasticity")]
+    is_known = forces is None or forces.motion_is_known
+    if given.times is None and of_forces and not is_known:
+        raise InputError(
+            f"measurements.times must be given to estimate {', '.join(of_forces)}, got none, and the poses look like "
+            "those of a motion; if they are at rest, give times more than 0.2 s apart"
+        )
+    if "elasticity" in groups and given.tensions is None and not is_known:
         raise InputError(
             "measurements.poses must be known throughout a motion to estimate elasticity without tensions, got "
             f"{int(tracked(chosen, given).sum())} of {len(given)}: longer gaps and open ends hide accelerations"
@@ -85,4 +94,8 @@ def calibrate(
         elastic = solve(chosen, given, longer, sigmas, outliers, near)
         if is_elastic(elastic):
             groups, priors, solved = longer, sigmas, elastic
+    for _ in range(ROUNDS_OF_SLACK):
+        if not uses_slack(solved):
+            break
+        solved = solve(chosen, given, groups, priors, outliers, solved)
     return Calibration(solved, groups, priors, found)

@@ -16,6 +16,7 @@ from .balance import Balance, hangs
 from .carrier_clocks import CarrierClocks, has_carrier_clocks, with_carrier_clocks
 from .carrier_motion import CarrierMotion
 from .clock import CLOCK_RANGE, begin_with_clock, moves_smoothly
+from .considered import considered
 from .fit import Fit, fit
 from .geometry import length_of
 from .hanging import carrying, without_slack
@@ -263,13 +264,13 @@ def model_of(
 
     `track` is that of a model with the same poses, which needs as much memory as the log. `weights` are those of
     `Model`; default: of all readings but those of `left_out`. `near` is a fit of the same log: its parameters tell the
-    tensions of a platform that `hangs` better than the file's.
+    tensions of a platform that `hangs` better than the file's, and so which cables are slack.
     """
     parameters = Parameters(robot, groups)
     track = near.model.track if near else track
-    weights = ~np.any(list(left_out(robot, measurements).values()), axis=0).T if weights is None else weights
     forces = (near.model.forces if near else None) or Balance(robot, measurements)
-    model = Model(parameters, measurements, prior, weights, forces=forces)
+    every = np.ones(measurements.lengths.shape[::-1], dtype=bool)
+    model = Model(parameters, measurements, prior, every if weights is None else weights, forces=forces)
     if "clock" in groups:
         if track is None:
             position, rotation, _ = measured_poses(robot, measurements)
@@ -285,7 +286,10 @@ def model_of(
     elastic = "elasticity" in groups or parameters.compliances(parameters.first).any()
     begin = model.begin()
     felt = carrying(model, begin._replace(x=near.parameters) if near else begin) if elastic else None
-    return model if felt is None else replace(model, felt=felt)
+    if weights is None:
+        carried = felt.tensions if felt and near else None
+        weights = ~np.any(list(left_out(robot, measurements, carried).values()), axis=0).T
+    return replace(model, weights=weights, felt=felt)
 
 
 def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ...], prior: dict[str, float]) -> None:
@@ -381,7 +385,11 @@ def inflation_of(noise: Noise) -> float:
 
 
 def covariance_of(solved: Solved, noise: Noise) -> np.ndarray:
-    """Return the covariance of the parameters, (p, p), in their order and units [m, 1, s]."""
+    """Return the covariance of the parameters, (p, p), in their order and units [m, 1, s].
+
+    That of mass, CoM, friction, gains and zeros includes errors of cable ends that are fixed.
+    """
     scale = metric(solved.model)[solved.model.parameters.varies]
     covariance = noise.covariance / scale[:, None] / scale
+    covariance += considered(solved.model, solved.fit.state, solved.observability.inverse)
     return (covariance + covariance.T) / 2

@@ -2,6 +2,8 @@
 
 Weight and inertia determine the tensions where a platform `hangs`. Errors of the attachments, for example, may look
 like cables of different stiffness, so these are taken to be equal, and attachments to be wrong by a few millimetres.
+The CoM, by which the cables share the weight, is taken to be wrong by a tenth of the attachments' distances. Only then
+do the tensions tell which cables are slack.
 """
 
 from dataclasses import replace
@@ -9,9 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from .balance import Balance, FeltTensions, hangs
+from .considered import usual_error
 from .fit import held
 from .geometry import length_of
 from .hanging import carrying
+from .left_out import hardly_pull
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
 from .parameters import COMMON, GROUPS
@@ -19,8 +23,10 @@ from .solving import Solved, covariance_of, noise_of
 from .turning import turning
 
 POSSIBLE, CERTAIN = 3.0, 4.0  # standard deviations of a compliance: of independent errors, and of all
+UNEXPLAINED = 1.5  # times the stated standard deviation, of residuals that the model does not explain
 BLOCKS, BLOCK = 20, 500  # of successive samples of a long log, which show stretch as well as all of them
-ACCURATE, ACCURATELY = 0.005, 0.001  # [m], and share of the cables' length: errors of attachments in files
+OF_COM = 0.1  # of the attachments' distances from each other: error of the CoM in files
+LOOSE = 1e-3  # of the readings, which may be of cables that hardly pull
 
 
 def with_elasticity(solved: Solved) -> tuple[tuple[str, ...], dict[str, float]]:
@@ -29,14 +35,18 @@ def with_elasticity(solved: Solved) -> tuple[tuple[str, ...], dict[str, float]]:
     turns = turning(of.robot, of.measurements)
     if turns is not None and turns.enough and "attachments" not in groups:
         groups = (*groups, "attachments")
-        prior["attachments"] = min(ACCURATE, ACCURATELY * length_of(of.robot))
+        prior["attachments"] = usual_error(of)
+    arms = of.robot.attachments.std(axis=0)
+    if "com" not in groups and of.forces is not None and of.forces.equations.any() and arms.any():
+        groups, prior["com"] = (*groups, "com"), OF_COM * float(np.linalg.norm(arms))
     return tuple(name for name in GROUPS if name in (*groups, "elasticity")), prior
 
 
 def with_stretch(solved: Solved) -> Solved | None:
     """Return a fit after one step with elasticity, if stretch reduces the residuals more than errors do by chance.
 
-    None also if the file has a stiffness, or weight does not determine the tensions, or accelerations are unknown.
+    Where residuals are far larger than stated, one step may not show it, and an elastic fit must be tried. None also if
+    the file has a stiffness, or weight does not determine the tensions, or accelerations are unknown.
     """
     of, state = solved.model, solved.fit.state
     groups, known = of.parameters.groups, of.parameters.compliances(of.parameters.first).any()
@@ -50,7 +60,7 @@ def with_stretch(solved: Solved) -> Solved | None:
     covariance = np.linalg.inv(held(equations.S, length_of(model.robot)))
     step, own = -covariance @ equations.b, np.flatnonzero(varies) == model.parameters.clock + COMMON
     excess = max(1.0, float(np.nan_to_num(noise_of(solved).excess)))
-    if not (step[own] > POSSIBLE * excess * np.sqrt(covariance[own, own])).all():
+    if excess < UNEXPLAINED and not (step[own] > POSSIBLE * excess * np.sqrt(covariance[own, own])).all():
         return None
     x = state.x.copy()
     x[varies] += step / scale[varies]
@@ -91,3 +101,10 @@ def certainty(solved: Solved) -> float:
 def is_elastic(solved: Solved) -> bool:
     """Return whether a fit with elasticity shows that cables stretch."""
     return solved.fit.converged and certainty(solved) > CERTAIN
+
+
+def uses_slack(solved: Solved) -> bool:
+    """Return whether a fit with elasticity uses readings of cables that hardly pull by its own tensions."""
+    of = solved.model
+    felt = None if of.felt is None or of.size_is_open else carrying(of, solved.fit.state)
+    return felt is not None and bool((of.weights & hardly_pull(felt.tensions).T).mean() > LOOSE)

@@ -1,0 +1,55 @@
+"""`considered`: what errors of cable ends that a fit takes as exact do to mass, CoM, friction, gains and zeros.
+
+Parameters f are fitted with the ends c of the file. With the normal matrix S of both, an error of the ends moves the
+fit by -S_ff^-1 S_fc dc, whose covariance is added to that of the readings' noise (consider covariance, Schmidt 1966).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from .geometry import length_of
+from .model import Model, State
+from .normal_equations import NormalEquations, metric
+from .parameters import GROUPS, IN_BALANCE, Parameters
+
+ENDS = ("anchors", "attachments")
+ACCURATE, ACCURATELY = 0.005, 0.001  # [m], and share of the cables' length: errors of cable ends in files
+
+
+def usual_error(model: Model) -> float:
+    """Return the standard deviation of each coordinate of a cable's end in a file without `uncertainty` [m]."""
+    return min(ACCURATE, ACCURATELY * length_of(model.robot))
+
+
+def considered(model: Model, state: State, inverse: np.ndarray) -> np.ndarray:
+    """Return the covariance that errors of fixed cable ends add, (p, p), in the order and units of the parameters.
+
+    These errors are those of the file's `uncertainty`, or the usual ones of ends that it does not contain. The result
+    is zero except for parameters of the balance of forces: the geometry is estimated relative to the ends that are
+    fixed, but masses and forces are not relative to anything.
+
+    - `inverse`: pseudo-inverse of the normal matrix of the free parameters, in metres, (p, p).
+    """
+    of, uncertain = model.parameters, model.robot.uncertainty
+    varies, in_balance = np.flatnonzero(of.varies), Parameters(model.robot, IN_BALANCE).varies
+    own = in_balance[varies[varies < len(in_balance)]]
+    own = np.pad(own, (0, len(varies) - len(own)))  # slips are last
+    result = np.zeros((len(varies), len(varies)))
+    groups = tuple(name for name in GROUPS if name in (*of.groups, *ENDS))
+    if not own.any() or groups == of.groups:
+        return result
+    whole = replace(model, parameters=replace(of, groups=groups))
+    every = np.flatnonzero(whole.parameters.varies)
+    free = np.isin(every, varies)
+    errors = np.diag(np.full(whole.parameters.count, usual_error(model) ** 2))
+    if uncertain is not None:
+        named = of.places(uncertain.parameters)
+        errors[named], errors[:, named] = 0.0, 0.0
+        errors[np.ix_(named, named)] = uncertain.matrix
+    errors = errors[np.ix_(every[~free], every[~free])]
+    scale = metric(model)
+    S = NormalEquations.at(whole, state, scale).S
+    moved = (inverse @ S[np.ix_(free, ~free)])[own] / scale[varies[own], None]
+    result[np.ix_(own, own)] = moved @ errors @ moved.T
+    return result
