@@ -327,8 +327,10 @@ def test_stretch_of_cables_is_found_by_the_weight_that_hangs_from_them():
         assert not is_found or abs(again.parameters[-1].value - 2e-5) < 3 * elastic.sigma
     with pytest.raises(InputError, match=r"known throughout a motion to estimate elasticity .* 280 of 300"):
         calibrate(robot, again.measurements, free=("anchors", "offsets", "elasticity"))
+    timeless = log.changed(times=None)
     with pytest.raises(InputError, match="times must be given to estimate elasticity, got none, and the poses look"):
-        calibrate(robot, log.changed(times=None), free=("anchors", "offsets", "elasticity"))
+        calibrate(robot, timeless, free=("anchors", "offsets", "elasticity"))
+    assert "a motion without times: stretch of the cables was not sought" in str(calibrate(robot, timeless).report())
     stiff = robot.model_copy(
         update={"cables": tuple(one.model_copy(update={"stiffness": 1e5}) for one in robot.cables)}
     )

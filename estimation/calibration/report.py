@@ -125,6 +125,10 @@ def _of_noise(result: CalibrationData) -> list[str]:
         else:
             size = quantity(1e-3 / stretch.value, "kN", 3)
             lines.append(f"cables stretch: E A is {size}, +- {share} %, if it is the same for all cables{by_weight}")
+    forces = result._solved.model.forces
+    timeless = hangs(result.file, result.measurements) and result.measurements.times is None
+    if timeless and forces is not None and not forces.motion_is_known:
+        lines.append("the poses look like those of a motion without times: stretch of the cables was not sought")
     for frame, end in ((one, ENDS[one]) for one in ENDS if one in result.free):
         size = f"wrong by {_mm(result.prior[end])}" if end in result.prior else "exact"
         what = "the frame of the poses" if frame == "frame" else "the measured body"
