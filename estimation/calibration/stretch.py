@@ -30,7 +30,10 @@ LOOSE = 1e-3  # of the readings, which may be of cables that hardly pull
 
 
 def with_elasticity(solved: Solved) -> tuple[tuple[str, ...], dict[str, float]]:
-    """Return parameters and standard deviations about the file's values with the elasticity of cables."""
+    """Return parameters and standard deviations about the file's values with attachments, CoM and elasticity of cables.
+
+    The elasticity is free unless the file has stiffnesses.
+    """
     of, groups, prior = solved.model, solved.model.parameters.groups, dict(solved.model.prior)
     turns = turning(of.robot, of.measurements)
     if turns is not None and turns.enough and "attachments" not in groups:
@@ -39,27 +42,33 @@ def with_elasticity(solved: Solved) -> tuple[tuple[str, ...], dict[str, float]]:
     arms = of.robot.attachments.std(axis=0)
     if "com" not in groups and of.forces is not None and of.forces.equations.any() and arms.any():
         groups, prior["com"] = (*groups, "com"), OF_COM * float(np.linalg.norm(arms))
-    return tuple(name for name in GROUPS if name in (*groups, "elasticity")), prior
+    known = of.parameters.compliances(of.parameters.first).any()
+    return tuple(name for name in GROUPS if name in groups or (name == "elasticity" and not known)), prior
 
 
 def with_stretch(solved: Solved) -> Solved | None:
     """Return a fit after one step with elasticity, if stretch reduces the residuals more than errors do by chance.
 
     Where residuals are far larger than stated, one step may not show it, and an elastic fit must be tried. None also if
-    the file has a stiffness, or weight does not determine the tensions, or accelerations are unknown.
+    weight does not determine the tensions, or accelerations are unknown. If the file has stiffnesses, the step includes
+    CoM and attachments instead, and is only taken where residuals are so large.
     """
     of, state = solved.model, solved.fit.state
-    groups, known = of.parameters.groups, of.parameters.compliances(of.parameters.first).any()
-    if not groups or "elasticity" in groups or known or not hangs(of.robot, of.measurements):
+    groups, (more, prior) = of.parameters.groups, with_elasticity(solved)
+    if not groups or "elasticity" in groups or not hangs(of.robot, of.measurements):
         return None
     if of.forces is None or not of.forces.motion_is_known:  # which takes longer to know
         return None
+    excess = max(1.0, float(np.nan_to_num(noise_of(solved).excess)))
+    known = "elasticity" not in more
+    if known and (excess < UNEXPLAINED or "com" in groups or "com" not in more):
+        return None
     of, of_some = _some(of, state)
-    model = replace(of, parameters=replace(of.parameters, groups=(*groups, "elasticity")))
+    model = replace(of, parameters=replace(of.parameters, groups=more if known else (*groups, "elasticity")))
+    model = replace(model, prior=prior) if known else model
     equations, varies = NormalEquations.at(model, of_some, scale := metric(model)), model.parameters.varies
     covariance = np.linalg.inv(held(equations.S, length_of(model.robot)))
     step, own = -covariance @ equations.b, np.flatnonzero(varies) == model.parameters.clock + COMMON
-    excess = max(1.0, float(np.nan_to_num(noise_of(solved).excess)))
     if excess < UNEXPLAINED and not (step[own] > POSSIBLE * excess * np.sqrt(covariance[own, own])).all():
         return None
     x = state.x.copy()
@@ -89,17 +98,22 @@ def _some(of: Model, state: State) -> tuple[Model, State]:
 
 
 def certainty(solved: Solved) -> float:
-    """Return by how many standard deviations cables are more elastic than in the file; 0 if that is unknown."""
-    of = solved.model.parameters
-    own = np.flatnonzero(np.flatnonzero(of.varies) == of.clock + COMMON)
+    """Return by how many standard deviations cables are more elastic than in the file, or else the CoM is elsewhere.
+
+    0 if that is unknown.
+    """
+    of, elastic = solved.model.parameters, "elasticity" in solved.model.parameters.groups
+    places = of.clock + np.array([COMMON] if elastic else [2, 3, 4])
+    own = np.flatnonzero(np.isin(np.flatnonzero(of.varies), places))
     if not own.size or not solved.observability.determined[own].all():
         return 0.0
-    sigma = np.sqrt(covariance_of(solved, noise_of(solved))[own[0], own[0]])
-    return float(solved.fit.state.x[of.clock + COMMON] / max(sigma, 1e-300))
+    sigmas = np.sqrt(np.diag(covariance_of(solved, noise_of(solved)))[own])
+    change = (solved.fit.state.x - of.first)[places]
+    return float(((change if elastic else np.abs(change)) / np.maximum(sigmas, 1e-300)).max())
 
 
 def is_elastic(solved: Solved) -> bool:
-    """Return whether a fit with elasticity shows that cables stretch."""
+    """Return whether a fit with elasticity shows that cables stretch, or that their stretch shows another CoM."""
     return solved.fit.converged and certainty(solved) > CERTAIN
 
 
