@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..solvers import Horizon
 
 Array = NDArray[np.float64]
-REFERENCE, TOWLINE = "condensed, daqp.solve", "towline Horizon, as simulated"
+REFERENCE, TOWLINE = "condensed, daqp.solve", "towline Horizon, warm-started"
 FAR = 1e4  # in place of infinite bounds, for solvers that need numbers
 GOOD = 1e-3  # residuals at which predictive control uses a solution that did not converge
 FIELDS = ("A", "B", "c", "start", "Q", "R", "q", "r", "u_min", "u_max")

@@ -124,7 +124,7 @@ def _of_log(robot: Robot, logs: list[Path], fields: Path | None, sigma: str, out
         for i, name in enumerate(SIX.split()):
             middle = 1e3 * float(np.median(sigmas[:, i]))
             size = quantity(middle, "mm" if i < 3 else "mrad", 3) if np.isfinite(middle) else "undetermined"
-            size = size if robot.dof_mask[i] else "fixed"
+            size = size if robot.dof_mask[i] else "none, because it is fixed (not in `platform.dof`)"
             typer.echo(f"  median sigma of {name}: {size}")
         if not np.isfinite(sigmas).all():
             typer.echo("  a motion of the platform changes none of the readings: poses are undetermined along it")

@@ -125,7 +125,7 @@ def _show(robot: Robot, result: dict[str, Any], at_home: TensionSolution, box: R
     from ..base.text import counted, quantity, quantity_range, quantity_row
 
     of = f"of {len(robot.platform.dof)}"
-    highest = f"{result['rank_level']} with the platform level, {result['rank_tilted']} tilted"
+    highest = f"{result['rank_level']} if the platform is level, {result['rank_tilted']} if it is tilted"
     reason = f" ({result['reason']})" if result["reason"] else ""
     rank = f"rank {result['rank']} {of} at home{reason}"
     if result["rank"] < len(robot.platform.dof):
@@ -194,6 +194,8 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
         ]
     lines = [f"  can rest, {held}, in the box", f"    {', '.join(sides)}"]
     if (box.centre != robot.home[:3]).any():
-        lines[0] += f" about ({quantity_row(box.centre)}) m, the sampled position nearest to home at which it can rest"
+        lines[0] += (
+            f" that contains ({quantity_row(box.centre)}) m, the sampled position nearest to home at which it can rest"
+        )
     steps = quantity_row(box.spacing[box.spacing > 0], digits=2)
     return [*lines, f"    ({quantity(box.samples)} positions sampled, spaced by {steps} m along the axes)"]

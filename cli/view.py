@@ -29,7 +29,7 @@ def view(
         typer.Argument(
             metavar="TARGET",
             help="A robot (name or YAML file), or a plan, simulation or workspace file (NetCDF); default: the "
-            "library, from its first robot on.",
+            "first robot of the library. The others can be selected in the browser.",
             autocompletion=robot_names,
         ),
     ] = None,

@@ -36,8 +36,8 @@ METRICS = (
     --condition KIND|JSON: Condition: its kind, or JSON with the kind and its keys, such as '{{"kind": "margin",
         "above": 5}}'. Kinds: {CONDITIONS}. Repeat the option to combine; all must hold. Default: static-equilibrium.
     --define FILE.py: Python file with conditions of your own.
-    --metric NAME: Metric to compute at the samples in the file, and to draw with --figure: {METRICS}. May be repeated.
-        Default: none.
+    --metric NAME: Metric to compute at the samples that are kept (see --keep), and to draw with --figure: {METRICS}.
+        May be repeated. Default: none.
     --robust SHARE: The tension conditions hold at all accepted poses simultaneously for this fraction, such as 0.95, of
         all robots within the uncertainty of the robot file. Default: the nominal robot only.
     --box: Box of positions [m]: 'xmin ymin zmin; xmax ymax zmax'. Default: a box around home and the anchors, above the

@@ -16,7 +16,8 @@ class Controller(ABC):
     Attributes:
         batches: True if `step` accepts states with a leading dimension, a robot in each row, and treats every row
             independently. Otherwise each of many runs uses a copy.
-        drive: Type of command of the plant that `simulate` uses, see `Plant`; default: depends on the robot.
+        drive: How `simulate` passes the commands to the plant: one of the drives of `Plant`; default: depends on the
+            robot.
     """
 
     batches = False

@@ -26,7 +26,7 @@ from .open_loop import planned_command
 from .state import Reference, State
 
 SHARE, STRAIN = 0.05, 0.005  # of the robot's length, and of the longest cable: the default of `most`
-DAMPED = 0.002  # [s]: damping of unknown cables, in terms of their stiffness
+DAMPED = 0.002  # [s/m]: damping of unknown cables, in terms of their stiffness
 PERIOD = 1e-3  # [s]: taken to be that of the steps at the first one
 QUICKEST = 2e-3  # [s]: in which winches follow that are said to have no lag
 SAMPLED = 2000  # references that are looked at before a run
@@ -51,15 +51,15 @@ class LengthControl(Controller):
         stiffness: E A [N], a number or one for each cable, instead of the file's values; infinity for a cable that does
             not stretch (also the default of a cable without a value in the file, if there are no more cables than
             degrees of freedom).
-        damping: C [N s/m], a number or one for each cable, instead of the file's values; 2 ms times `stiffness`
-            is assumed for a cable without stiffness in the file.
+        damping: C [N s/m], a number or one for each cable, instead of the file's values; 0.002 s/m times
+            `stiffness` is assumed for a cable without stiffness in the file.
         lag: Time constant with which the winches follow their commands [s], which the lengths make up for.
         proportional, integral: P, and I [1/s]; 0 and 0 for lengths without correction. The default is the largest, up
             to 4 and 10, with which no oscillation of the platform on its cables grows (control/length_gains.py). It
             depends on the largest age of the measured pose (from its `time`, or else from `sensors`), and is 0 for
-            cables with no damping. For a late pose without its `time`, give the sensors or the gains: with the gains
-            for a current pose, oscillations grow. Such a pose is compared with the plan of its time, which is earlier
-            by the sensors' delay and, up to 0.2 s, by the time since the pose changed.
+            cables with no damping. If poses are late and have no `time`, pass `sensors` or the gains: the default gains
+            are for current poses, and oscillations would grow. Such a pose is compared with the plan of its time, which
+            is earlier by the sensors' delay and, up to 0.2 s, by the time since the pose changed.
         most: Largest correction of a length [m]; default: 5 % of `Robot.length`, but at least 0.5 % of the longest
             cable, about as much as that cable may stretch. At this value the integral stops, and the status is "hold".
         sensors: Errors and delay of the sensors, a `simulation.Noise` or a mapping (default: unknown). The default of P

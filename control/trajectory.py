@@ -184,7 +184,7 @@ def _loads_of(samples: Contents, read: Any) -> list[tuple[float, RigidLoad | Non
     if [load.mass if load else 0.0 for load in loads] != masses.tolist():
         raise InputError(f"reference must be a plan whose task describes its loads, got one of {masses.max():g} kg")
     if any(phase.ground is not None for phase in phases):
-        raise InputError("reference must be a plan of loads without phases on the ground, got one with such phases")
+        raise InputError("reference must have no phase on the ground if it carries loads, got a plan with such phases")
     return list(zip(read("phase_start", (len(loads),)).tolist(), loads, strict=True))
 
 

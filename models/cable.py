@@ -23,7 +23,9 @@ class Winch(Part):
     inertia: Positive = Field(description="inertia of rotor, gear and drum, as an equivalent mass on the cable [kg]")
     friction: NonNegative = optional("dry friction, as a force on the cable [N]", 0.0)
     speed_max: Positive = Field(description="largest speed of the cable [m/s]")
-    force_max: Positive = Field(description="largest force of the motor on the cable, above the friction [N]")
+    force_max: Positive = Field(
+        description="largest force of the motor on the cable; friction reduces what is left for the tension [N]"
+    )
 
     @model_validator(mode="after")
     def _stronger_than_its_friction(self) -> Self:

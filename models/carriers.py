@@ -245,7 +245,7 @@ class QuadrotorCarrier(Carrier):
     # m (ddx - g) = f R e_z + F, and in its own axes I alpha + omega x I omega = tau + M.
 
     tows: ClassVar[bool] = True
-    efforts: ClassVar[tuple[str, ...]] = ("thrust", "torque", "force across the thrust")
+    efforts: ClassVar[tuple[str, ...]] = ("thrust", "torque", "force perpendicular to the thrust")
     coordinates: ClassVar[tuple[int, ...]] = (*POSITION, *TILT, *YAW)
 
     kind: Literal["quadrotor"]
@@ -309,7 +309,7 @@ class QuadrotorCarrier(Carrier):
     def required_effort(
         self, pose: Matrix, velocity: Matrix, acceleration: Matrix, pull: Matrix, gravity: np.ndarray
     ) -> tuple[Effort, ...]:
-        """Return thrust and torque, and the force across the thrust, which it cannot give."""
+        """Return thrust and torque, and the force perpendicular to the thrust, which it cannot give."""
         import casadi as ca  # as below: robots are read without it, faster
 
         from .rotation import turning
@@ -319,7 +319,7 @@ class QuadrotorCarrier(Carrier):
         torque = inertia @ alpha + ca.cross(Omega, inertia @ Omega) - pull[3:6]
         return (
             Effort("thrust", "N", force[2], self.thrust_min, self.thrust_max, scale=self.thrust_max),
-            Effort("force across the thrust", "N", force[:2], 0.0, 0.0, ("x", "y")),
+            Effort("force perpendicular to the thrust", "N", force[:2], 0.0, 0.0, ("x", "y")),
             *(
                 Effort("torque", "N m", torque[axis], -most, most, ("xyz"[axis],), most)
                 for axis, most in enumerate(self.torque_max)

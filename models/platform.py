@@ -39,8 +39,8 @@ class Platform(Part):
 
     mass: Positive = Field(description="mass [kg]")
     inertia: BodyInertia | None = optional(
-        "inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in platform axes, tensor signs [kg m^2]; "
-        "required unless the platform cannot turn"
+        "inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in platform axes [kg m^2], as entries of the tensor, so "
+        "Ixy is minus the integral of x y dm; required unless the platform cannot turn"
     )
     com: Vector3 = optional("CoM in the platform frame [m]", (0.0, 0.0, 0.0))
     home: Pose | None = optional(

@@ -24,7 +24,8 @@ class RigidLoad(Part):
     mass: NonNegative = Field(description="mass of the load [kg]; 0: none")
     com: Vector3 = optional("CoM of the load in the platform frame [m]", (0.0, 0.0, 0.0))
     inertia: Annotated[Inertia, AfterValidator(_check_positive_semidefinite)] = optional(
-        "inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM of the load in platform axes, tensor signs [kg m^2]",
+        "inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM of the load in platform axes [kg m^2], as entries of the "
+        "tensor, so Ixy is minus the integral of x y dm",
         AT_ORIGIN,
     )
 

@@ -40,7 +40,7 @@ def _without_default(schema: dict[str, Any]) -> None:
 class Robot(Part):
     """A cable robot: one platform, carriers, cables. `load` and `Robot.model_validate` create it; it cannot be changed.
 
-    Computations use the arrays below; each has one row per cable or carrier, in the order of the file.
+    Arrays such as `anchors` have one row per cable or carrier, in the order of the file.
     """
 
     name: Name = Field(description="name of the robot, for reports and file names")

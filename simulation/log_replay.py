@@ -219,8 +219,9 @@ class Replay(Drawn, Reported, Displayed):
         if self.named:
             best = self.found[0]
             verb = "explain" if best.name in ("load_cells", "anchors") else "explains"
-            text += f"; {' or '.join(map(_words, self.named))} {verb} {_share(best)} of the residuals: "
-            text += _value(best.name, best.value)
+            first, *others = map(_words, self.named)
+            causes = " or ".join([f"{first} ({_value(best.name, best.value)})", *others])
+            text += f"; {causes} {verb} {_share(best)} of the residuals"
             after = self._rms(self.explained or {})
             more = any(after[name] > 2 * noise[name] for name in after)
             return f"{text}; the remainder has other causes" if more else text
@@ -371,7 +372,7 @@ def _value(name: str, value: Any) -> str:
     if name == "load_cells":
         gains, zeros = np.reshape(value, (2, -1))
         worst = int(np.argmax(np.abs(gains) + np.abs(zeros)))
-        rest = f"{'plus' if zeros[worst] >= 0 else 'minus'} {100 * abs(zeros[worst]):.2g} % of the usual tension"
+        rest = f"{'plus' if zeros[worst] >= 0 else 'minus'} {100 * abs(zeros[worst]):.2g} % of the median tension"
         return f"that of cables[{worst}] reads {1 + gains[worst]:.3g} times the tension {rest}"
     if name in FACTORS:
         return f"{value:.4g} times the file's"

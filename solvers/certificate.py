@@ -99,7 +99,10 @@ class Certificate(Displayed):
 
     @property
     def singular(self) -> bool:
-        """Return whether no cable pulls along the direction: no tensions of either sign, however large, give w."""
+        """Return whether the direction is perpendicular to the wrenches of all cables.
+
+        Not even negative tensions give w then.
+        """
         return self.binding.size == 0
 
     def verify(self, problem: TensionProblem) -> bool:
@@ -138,7 +141,12 @@ class Certificate(Displayed):
         Raises:
             InputError: If `up` is not three finite numbers.
         """
-        pull_only = " (the cables can pull only the other way)" if self.support < 0.0 and not self.singular else ""
+        other_way = ""
+        if self.support < 0.0 and not self.singular:
+            other_way = " (the cables can pull only the other way)"
+            if self.demand < 0.0:
+                least, needed = (quantity(-force, "N") for force in (self.support, self.demand))
+                other_way = f" (the cables pull the other way with at least {least}, where {needed} is needed)"
         limits = [
             f"{name} of {numbered('cable', indices)}"
             for name, indices in (("t_min", self.at_min), ("t_max", self.at_max))
@@ -147,7 +155,7 @@ class Certificate(Displayed):
         return CertificateText(
             along=self._along(None if up is None else finite_array("up", up, (3,))),
             needed=f"{quantity(self.demand, 'N')}",
-            available=f"at most {quantity(self.support, 'N')}{pull_only}",
+            available=f"at most {quantity(self.support, 'N')}{other_way}",
             short_by=f"{quantity(self.shortfall, 'N')}",
             limits="; ".join(limits) or "no cable pulls along this direction, however large its tension",
         )

@@ -26,7 +26,11 @@ _new = object.__new__
 
 
 def methods() -> dict[str, Method]:
-    """Return every method by name; each has `guarantee`, `source`, `options` and `backends()`."""
+    """Return every method by name; each has `guarantee`, `source`, `options` and `backends()`.
+
+    Guarantees are for problems with feasible tensions. If none exist, the result is a certificate without tensions,
+    unless the guarantee says otherwise.
+    """
     return dict(METHODS)
 
 

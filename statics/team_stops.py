@@ -385,7 +385,7 @@ def _limits(
             given = commands @ np.array([a.wrench for a in its.actuators[k]])
             lacking = np.linalg.norm((wrench - given)[..., :3], axis=-1)
             most = max(robot.t_min[its.first[k]], LACKING * robot.t_max[its.first[k]])
-            rows.append((f"force across the thrust of {name}", lacking, 0.0, most))
+            rows.append((f"force perpendicular to the thrust of {name}", lacking, 0.0, most))
         for what, values, largest in (
             ("speed", speeds, own.speed),
             ("acceleration", bends, own.acceleration),

@@ -77,7 +77,7 @@ def test_without_a_law_there_is_a_proof_and_no_file(folder):
     assert told["bottlenecks"] == []
     assert not list(folder.glob("*-timed.yaml"))
     text = run("time", "heavy.yaml", "lift.yaml", cwd=folder, code=1).stdout
-    assert text.startswith("hoist, lift: INFEASIBLE, short by 4.62 N at s = ")
+    assert text.startswith("hoist, lift: INFEASIBLE, 4.62 N short of the required wrench at s = ")
     assert "of the path (0 at its start, 1 at its end), where no time law is feasible" in text
 
 

@@ -126,7 +126,7 @@ def test_headlines_state_the_result(results):
     of = {name: repr(result).splitlines()[0] for name, result in results.items()}
     assert "FEASIBLE" in of["Plan"]
     certificate = results["infeasible Plan"].certificate
-    assert f"INFEASIBLE, short by {certificate.shortfall:.0f} N" in of["infeasible Plan"]
+    assert f"INFEASIBLE, {certificate.shortfall:.0f} N short of the required wrench" in of["infeasible Plan"]
     assert "PASSED" in of["Simulation"]
     assert "FAILED" in of["Simulation with nan"]
     assert of["BatchSolution"] == "5000 problems: 5000 infeasible"

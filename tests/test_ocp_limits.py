@@ -214,14 +214,14 @@ def test_quadrotors_move_as_forward_dynamics_moves_them():
     seen, scenario = found.audit, found.scenario
     names = [limit.name for limit in scenario.limits]
     first = names.index("thrust")
-    assert names[first : first + 5] == ["thrust", "force across the thrust", "torque", "torque", "torque"]
+    assert names[first : first + 5] == ["thrust", "force perpendicular to the thrust", "torque", "torque", "torque"]
     asked = np.hstack(seen.limited[first : first + 5])
     carrier = robot.carriers[0]
     assert asked[:, 0].max() <= carrier.thrust_max
     assert np.abs(asked[:, 3:]).max() <= max(carrier.torque_max)
     nodes = np.linspace(0, len(seen.times) - 1, 61).astype(
         int
-    )  # between them a little force across the thrust is missing
+    )  # between them a little force perpendicular to the thrust is missing
     for row in nodes[::10]:
         platform, base = scenario.dynamics.coupled_acceleration(
             seen.motion.pose[row],

@@ -170,7 +170,7 @@ def test_without_a_feasible_change_the_report_says_what_may_help():
     above = plan("wang-ctmrts", {"path": away, "duration": 6})
     assert not above.relaxations
     assert "no cable pulls along force (0.00, 0.00, 1.00)" in above.report()  # above all anchors
-    assert "a nearer path" in above.report()
+    assert "a path inside the frame" in above.report()
 
 
 FLOOR = {"mass": 20, "dof": ["x", "y", "z"]}

@@ -99,7 +99,10 @@ def test_report_of_a_feasible_plan_tells_what_the_audit_saw(free):
 def test_report_of_an_infeasible_plan_tells_the_certificate(impossible):
     told, certificate = facts(impossible), impossible.certificate
     why = {name: fact for (title, name), fact in told.items() if title == "Why it is infeasible"}
-    assert f"INFEASIBLE, short by {certificate.shortfall:.4g} N at t = {certificate.time:.3f} s" in headline(impossible)
+    assert (
+        f"INFEASIBLE, {certificate.shortfall:.4g} N short of the required wrench at t = {certificate.time:.3f} s"
+        in headline(impossible)
+    )
     assert why["time"] == f"t = {certificate.time:.3f} s of 1 s"
     assert number(why["needed"]) == pytest.approx(certificate.demand, rel=1e-3)
     assert number(why["available"].removeprefix("at most ")) == pytest.approx(certificate.support, rel=1e-3)

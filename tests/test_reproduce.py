@@ -254,7 +254,7 @@ def test_the_missing_newtons_of_the_helix(claims):
     A = dynamics.relative.wrench_matrix(turn.pose[row]) * scale[:, None]
     w = dynamics.relative.required_wrench(*(part[row] for part in turn)) * scale
     _, shortfall = nnls(A, w)
-    (reported,) = re.findall(r"short by ([\d.]+) N", claims["fig-7-positive"].why)
+    (reported,) = re.findall(r"give ([\d.]+) N too little", claims["fig-7-positive"].why)
     assert float(reported) == pytest.approx(shortfall, abs=0.01)
 
 

@@ -375,7 +375,7 @@ def test_loads_on_the_ground_are_refused(tmp_path):
     bag = {"mass": 20}
     phases = [{"name": "down", "path": line, "duration": 2, "load": bag}]
     phases.append({"name": "put", "ground": {}, "duration": 0.5, "load": bag})
-    with pytest.raises(InputError, match="reference must be a plan of loads without phases on the ground"):
+    with pytest.raises(InputError, match="reference must have no phase on the ground if it carries loads"):
         simulate(robot, plan(robot, {"phases": phases}))
 
 

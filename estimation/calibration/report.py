@@ -97,7 +97,8 @@ def _of_held_out(result: CalibrationData) -> list[str]:
         )
     elif held_out.after > 1.5 * fitted:
         lines.append(
-            f"the residual on training samples is only {_mm(fitted)}, so this many parameters require more samples"
+            f"validation samples have larger residuals ({_mm(held_out.after)}) than training samples ({_mm(fitted)}): "
+            "so many parameters require more samples"
         )
     return lines
 

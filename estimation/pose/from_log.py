@@ -83,7 +83,7 @@ class LogPoses(Displayed):
 
     @property
     def largest(self) -> float:
-        """Return the `cost` above which no pose fits a sample; nan without redundant cables.
+        """Return the largest `cost` at which a pose fits a sample; nan without redundant cables.
 
         In a log without wrong readings, the probability that any sample exceeds it is 1 %.
         """

@@ -72,29 +72,31 @@ def _still(audited: Instants) -> list[Excess]:
         if not carrier.free_coordinates(robot.drive):
             moves = np.maximum(np.abs(velocity).max(axis=1), np.abs(acceleration).max(axis=1))
             why = f"the drive {robot.drive} moves only winches"
-            exceeded += _above(audited, "drive", carrier.name, moves, STILL_TOLERANCE, "m/s", why)
+            exceeded += _above(audited, "drive", carrier.name, moves, STILL_TOLERANCE, "m/s", "speed", why)
         free, why = carrier.free_coordinates("both"), f"a carrier of kind {carrier.kind} cannot change it"
         for limit, coordinates, unit in (("carrier_position", POSITION, "m"), ("carrier_attitude", ATTITUDE, "rad")):
             kept = [i for i in coordinates if i not in free]
             if kept:
                 off = np.abs(pose[:, kept] - np.array(carrier.home)[kept]).max(axis=1)
-                exceeded += _above(audited, limit, carrier.name, off, STILL_TOLERANCE, unit, why)
+                exceeded += _above(audited, limit, carrier.name, off, STILL_TOLERANCE, unit, "distance from home", why)
     return exceeded
 
 
 def _above(
-    audited: Instants, limit: str, about: str, values: np.ndarray, tolerance: float, unit: str, why: str = ""
+    audited: Instants, limit: str, about: str, values: np.ndarray, tolerance: float, unit: str, what: str, why: str = ""
 ) -> list[Excess]:
     """Check that values (n,) that ought to be zero never exceed a tolerance."""
     row = int(values.argmax())
-    return _missed(limit, about, audited.times[row], values[row], tolerance, unit, why)
+    return _missed(limit, about, audited.times[row], values[row], tolerance, unit, what, why)
 
 
 def _missed(
-    limit: str, about: str, time: float, value: float, tolerance: float, unit: str, why: str = ""
+    limit: str, about: str, time: float, value: float, tolerance: float, unit: str, what: str, why: str = ""
 ) -> list[Excess]:
     """Check that a value that ought to be zero is a number not above a tolerance."""
-    return [] if value <= tolerance else [Excess(limit, about, float(time), float(value), 0.0, unit, "exactly", why)]
+    if value <= tolerance:
+        return []
+    return [Excess(limit, about, float(time), float(value), 0.0, unit, "exactly", why, what)]
 
 
 def _lengths(audited: Instants) -> list[Excess]:
@@ -125,12 +127,12 @@ def _initial(audited: Instants) -> list[Excess]:
                 if order == 0:
                     off[3:] = np.arctan2(np.sin(off[3:]), np.cos(off[3:]))
                 unit = ("m, rad", "m/s, rad/s", "m/s^2, rad/s^2")[order]
-                why = f"distance from the {'given end' if end else 'measured start'}"
-                exceeded += _missed(name, about, audited.times[end], np.abs(off).max(), END_TOLERANCE, unit, why)
+                what = f"distance from the {'given end' if end else 'measured start'}"
+                exceeded += _missed(name, about, audited.times[end], np.abs(off).max(), END_TOLERANCE, unit, what)
     if task.final is not None and task.final.rests_anywhere:
         kept = [at_rest_without_acceleration(audited.scenario.robot, None, i) for i in range(6)]
         worst = np.abs(audited.motion.acceleration[-1, kept]).max()
-        facts = (worst, END_ACCELERATION_TOLERANCE, "m/s^2, rad/s^2", "at the end, at rest")
+        facts = (worst, END_ACCELERATION_TOLERANCE, "m/s^2, rad/s^2", "acceleration", "it must rest there")
         exceeded += _missed("final", "platform", audited.times[-1], *facts)
     return exceeded + _start_tensions(audited)
 
@@ -180,9 +182,10 @@ def _tube_ends(audited: Instants) -> list[Excess]:
                 counts = word == "exact" or unit == "m" or per == "/s"
                 counts |= per == "/s^2" and at_rest_without_acceleration(scenario.robot, None, place[0])
                 if counts:
-                    why = "distance from its path" if not per else "difference from the motion of its path"
-                    why = "it must rest there" if per and word == "rest" else why
-                    exceeded += _missed("tube.ends", "platform", end, off, tolerance, unit + per, why)
+                    what = "distance from its path" if not per else "difference from the motion of its path"
+                    if per and word == "rest":
+                        what = "speed" if per == "/s" else "acceleration"
+                    exceeded += _missed("tube.ends", "platform", end, off, tolerance, unit + per, what)
     return exceeded
 
 
@@ -205,7 +208,8 @@ def _waypoints(audited: Instants) -> list[Excess]:
     exceeded = []
     for k, time in enumerate(times):
         for value, unit in ((off[k], "m"), (turned[k], "rad")):
-            exceeded += _missed("tube.waypoints", f"platform at point {k + 2}", time, value, PATH_TOLERANCE, unit)
+            facts = (time, value, PATH_TOLERANCE, unit, "distance")
+            exceeded += _missed("tube.waypoints", f"platform at point {k + 2}", *facts)
     return exceeded
 
 
@@ -229,19 +233,20 @@ def _base_ends(audited: Instants) -> list[Excess]:
         off = [audited.carriers.velocity[:, moving]]
         if at_rest_without_acceleration(scenario.robot, moving[0], 0):
             off.append(audited.carriers.acceleration[:, moving, :3])
-        units, why = UNITS[1:], "they must be at rest there"
+        units, what = UNITS[1:], ("speed", "acceleration")
     elif word == "periodic":
         off, ends = [part[:, moving] - part[0, moving] for part in audited.carriers], [-1]
-        units, why = UNITS, "difference from the start"
+        units, what = UNITS, ("difference from the start",) * 3
     else:
         references = scenario.references(audited.times)[1]
         off = [audited.carriers[k][:, i] - references[i][k] for i in moving for k in range(2)]
-        units, why = UNITS[:2] * len(moving), "distance from `around`"
+        units, what = UNITS[:2] * len(moving), ("difference from `around`",) * 2 * len(moving)
     exceeded = []
     for end in ends:
         sizes = [np.abs(part[end]).max() for part in off]
         worst = int(np.argmax(sizes))  # one that is nan, if there is any
-        exceeded += _missed("base.ends", "carriers", audited.times[end], sizes[worst], END_TOLERANCE, units[worst], why)
+        facts = (audited.times[end], sizes[worst], END_TOLERANCE, units[worst], what[worst])
+        exceeded += _missed("base.ends", "carriers", *facts)
     return exceeded
 
 
@@ -253,8 +258,9 @@ def _grounded(audited: Instants) -> list[Excess]:
     values = np.stack([audited.off_path, audited.motion.velocity, audited.motion.acceleration])
     off = np.where(resting[:, None], np.abs(values).max(axis=2).T, 0.0)  # (n, 3)
     worst = int(np.argmax(off.max(axis=0)))  # one that is nan, if there is any
+    what = ("distance from its path", "speed", "acceleration")[worst]
     why = "on the ground it must rest on its path"
-    return _above(audited, "phases.ground", "platform", off[:, worst], END_TOLERANCE, UNITS[worst], why)
+    return _above(audited, "phases.ground", "platform", off[:, worst], END_TOLERANCE, UNITS[worst], what, why)
 
 
 def _locked(audited: Instants) -> list[Excess]:
@@ -263,8 +269,8 @@ def _locked(audited: Instants) -> list[Excess]:
     off = np.abs(audited.motion.pose - robot.home)
     for i, name in enumerate(COORDINATES):
         if not robot.dof_mask[i]:
-            why = "it is not one of the platform's degrees of freedom"
-            exceeded += _above(audited, "dof", f"platform {name}", off[:, i], PATH_TOLERANCE, _UNITS[i], why)
+            facts = (PATH_TOLERANCE, _UNITS[i], "distance from home", f"`platform.dof` does not contain {name}")
+            exceeded += _above(audited, "dof", f"platform {name}", off[:, i], *facts)
     return exceeded
 
 
@@ -303,6 +309,6 @@ def _jumps(audited: Instants) -> list[Excess]:
                 jump[..., 3:] = np.arctan2(np.sin(jump[..., 3:]), np.cos(jump[..., 3:]))
             jump = np.abs(jump).reshape(len(inner), -1).max(axis=1)
             row = int(jump.argmax())
-            why = "a jump of position or velocity"
-            exceeded += _missed("motion", name, inner[row], jump[row], tolerance, unit, why)
+            what = ("jump of the position", "jump of the velocity")[k]
+            exceeded += _missed("motion", name, inner[row], jump[row], tolerance, unit, what)
     return exceeded

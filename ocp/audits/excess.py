@@ -26,6 +26,8 @@ class Excess(Displayed):
     unit: str  # unit of value and bound
     accepted: Literal["at most", "at least", "exactly"] = "at most"  # side of the bound on which the value must be
     why: str = ""  # explanation; may be empty
+    what: str = ""  # what the value is, if it is not that of the limit: "distance from its path"
+    what: str = ""  # what the value is, if it is not that of the limit: "distance from its path"
     # The value with which the program would keep the limit, if that is another: that of a distance has no least, but a
     # thin region is nowhere deep. It is the bound where a tighter one at the nodes would not help.
     between: float | None = None
@@ -44,7 +46,7 @@ class Excess(Displayed):
         return cls(limit.name, limit.about(which), float(time), float(value), bound, limit.unit, side, why)
 
     def __str__(self) -> str:
-        """Return "carrier_speed of quad1 must be at most 2 m/s but is 2.5 m/s at t = 1.250 s"."""
+        """Return "carrier_speed of quad1 must be at most 2 m/s but is 2.5 m/s at t = 1.250 s", for example."""
         at = "" if self.time is None else f" at t = {self.time:.3f} s"
         why = f" ({self.why})" if self.why else ""
         body, _, region = self.about.partition(" outside ")
@@ -65,7 +67,8 @@ class Excess(Displayed):
                 value, bound = (quantity(number, self.unit, digits=digits) for number in (self.value, self.bound))
         value = "undefined" if np.isnan(self.value) else value
         owner = "" if self.about == "platform" and self.limit.startswith("platform_") else f" of {_named(self.about)}"
-        return f"{self.limit}{owner} must be {side}{bound} but is {value}{at}{why}"
+        what = f": {self.what}" if self.what else ""
+        return f"{self.limit}{owner}{what} must be {side}{bound} but is {value}{at}{why}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the fields for JSON, with the sentence as "text"; numbers that do not exist are None."""

@@ -51,8 +51,9 @@ def _directions(plan: PlanData) -> list[Fact]:
     """Return the shorter ways of lines to their attitudes, and which coordinates must not change without `dof`."""
     shorter = [("another path", sentence) for sentence in plan.warnings if OTHER_WAY in sentence]
     names = [excess.about.removeprefix("platform ") for excess in plan.audit.excess if excess.limit == "dof"]
-    kept = [("another path", f"one that keeps {', '.join(names)} as at home, outside `platform.dof`")] if names else []
-    return shorter + kept
+    them = ", ".join(names)
+    kept = [("another path", f"one that leaves {them} as at home: `platform.dof` does not contain {them}")]
+    return shorter + kept * bool(names)
 
 
 def _carriers(plan: PlanData) -> list[Fact]:
@@ -99,4 +100,4 @@ def _frame(plan: PlanData) -> list[Fact]:
     outside = [sentence for sentence in plan.warnings if sentence.startswith(LEAVES)]
     if not outside or units(plan):
         return []
-    return [("a nearer path", f"inside the frame: {outside[0].partition(':')[2].partition(';')[0].strip()}")]
+    return [("a path inside the frame", f"now {outside[0].partition(':')[2].partition(';')[0].strip()}")]

@@ -145,7 +145,8 @@ def _of_the_motion(plan: PlanData) -> str:
     if plan.law is not None and not plan.law.exists:
         if (proof := plan.law.certificate) is None:
             return "the motion only shows the path"
-        return f"short by {quantity(proof.shortfall, 'N')} at s = {plan.law.at:.4g}, whatever the speed"
+        short = f"{quantity(proof.shortfall, 'N')} short of the required wrench"
+        return f"{short} at s = {plan.law.at:.4g}, whatever the speed"
     if plan.law is not None and plan.feasible:
         return f"shortest duration {quantity(plan.duration, 's', 6)}"
     if plan.feasible:
@@ -161,7 +162,7 @@ def _of_the_motion(plan: PlanData) -> str:
         return f"{excess[0]}{in_phase(plan, excess[0].time)}{_more(len(excess) - 1)}"
     if certificate is None:
         return "see the stages"
-    short = f"short by {quantity(certificate.shortfall, 'N')} at t = {certificate.time:.3f} s"
+    short = f"{quantity(certificate.shortfall, 'N')} short of the required wrench at t = {certificate.time:.3f} s"
     short += in_phase(plan, certificate.time)
     if certificate.wind is not None:
         short += f" in wind {wind(certificate.wind)}"

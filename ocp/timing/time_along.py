@@ -71,11 +71,11 @@ def time_along(robot: AnyRobot, task: Task | dict[str, Any] | str | os.PathLike[
     parameter s.
 
     The task's limits on speeds and accelerations of platform, cables and carriers apply, and so do the robot file's
-    limits of winches and of mobile carriers that move. The motors of winches with inertia pull their cables and
-    accelerate the winches. The tension limits, reduced by the task's margin, enter as the facets of the available
-    wrench set. TOPP-RA computes the time law (H. Pham, Q.-C. Pham, "A new approach to time-optimal path
-    parameterization based on reachability analysis", IEEE T-RO 34(3), 2018): d2s/dt2 is constant between grid points,
-    so tensions jump there. The extra `timing` installs it.
+    limits of winches and of mobile carriers that move. If winches have inertia, `force_max` limits the sum of the
+    tension and the force that accelerates the winch. The tension limits, reduced by the task's margin, enter as the
+    facets of the available wrench set. TOPP-RA computes the time law (H. Pham, Q.-C. Pham, "A new approach to
+    time-optimal path parameterization based on reachability analysis", IEEE T-RO 34(3), 2018): d2s/dt2 is constant
+    between grid points, so tensions jump there. The extra `timing` installs it.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.

@@ -22,7 +22,7 @@ class AnalyticCentre(Method):
 
     name = "analytic-centre"
     guarantee = (
-        "unique, strictly inside the limits, continuously differentiable; failed if unbounded, certificate if none"
+        "unique, strictly inside the limits, continuously differentiable; fails if the feasible tensions are unbounded"
     )
     source = "S. Boyd, L. Vandenberghe, Convex Optimization, 2004, section 8.5.3"
     exact = True

@@ -23,8 +23,8 @@ class Centroid(Method):
 
     name = "centroid"
     guarantee = (
-        "barycentric: the centroid of the feasible tensions, continuous; failed if they are unbounded or m - rank > 5, "
-        "certificate if there are none"
+        "barycentric: the centroid of the feasible tensions, continuous in w; fails if they are unbounded or "
+        "m - rank > 5"
     )
     source = (
         "L. Mikelsons et al., ICRA 2008; J. Lamaury, M. Gouttefarde, Cable-Driven Parallel Robots 2013; "

@@ -28,7 +28,7 @@ class ClosedForm(Method):
 
     name = "closed-form"
     guarantee = (
-        "one matrix product, smooth in w; failed if the tensions leave the limits, which may happen though the problem "
+        "one matrix product, smooth in w; fails if the tensions leave the limits, which may happen though the problem "
         "is feasible"
     )
     source = (

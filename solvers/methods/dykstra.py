@@ -43,7 +43,8 @@ class Dykstra(Method):
 
     name = "dykstra"
     guarantee = (
-        "converges to the unique optimum, at no known rate: inaccurate after max_iter; certificate if there are none"
+        "converges to the unique optimum, at no known rate; the status is inaccurate if max_iter iterations do not "
+        "suffice"
     )
     source = "M. Hassan, A. Khajepour, IEEE Trans. Robotics 24(3), 2008; R. Dykstra, JASA 78, 1983"
     exact = False

@@ -18,7 +18,7 @@ class LargestMargin(Method):
     """
 
     name = "largest-margin"
-    guarantee = "the largest distance to the limits, of these the nearest to t_ref; certificate if there are none"
+    guarantee = "the largest distance to the limits; of all tensions with that distance, those nearest to t_ref"
     source = (
         "P. Borgstrom et al., 'Rapid computation of optimally safe tension distributions', "
         "IEEE Trans. Robotics 25(6), 2009"

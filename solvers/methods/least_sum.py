@@ -17,7 +17,10 @@ class LeastSum(Method):
     """
 
     name = "least-sum"
-    guarantee = "the least sum of tensions, of these the nearest to t_ref; may jump as cables turn"
+    guarantee = (
+        "the least sum of tensions; of all such tensions, those nearest to t_ref; may jump as the directions of cables "
+        "change"
+    )
     source = (
         "S. Fang et al., IEEE/ASME Trans. Mechatronics 9(3), 2004; "
         "HiGHS: Q. Huangfu, J. Hall, Math. Prog. Comp. 10, 2018"

@@ -28,7 +28,7 @@ class LogBarrier(Method):
     """
 
     name = "log-barrier"
-    guarantee = "unique, strictly inside the limits, continuously differentiable; certificate if there are none"
+    guarantee = "unique, strictly inside the limits, continuously differentiable"
     source = (
         "in the spirit of E. Ueland, T. Sauder, R. Skjetne, 'Optimal force allocation for overconstrained cable-driven "
         "parallel robots: continuously differentiable solutions', IEEE Trans. Robotics 37(2), 2021"

@@ -17,7 +17,10 @@ class MinMax(Method):
     """
 
     name = "min-max"
-    guarantee = "minimises the largest tension, of these the nearest to t_ref; may jump as cables turn"
+    guarantee = (
+        "minimises the largest tension; of all such tensions, those nearest to t_ref; may jump as the directions of "
+        "cables change"
+    )
     source = "the infinity norm of C. Gosselin, M. Grenier, Meccanica 46(1), 2011, as a linear program"
     exact = True
 

@@ -26,7 +26,7 @@ class MinNorm(Method):
     """Pseudo-inverse solution, moved along the null space as little as the limits require, or by a given lambda."""
 
     name = "min-norm"
-    guarantee = "the unique optimum; no tensions and a certificate if there are none"
+    guarantee = "the unique optimum"
     source = "Wang, Zhao, Li, Ji, cable-driven multi-robot towing system, Eq. 16-17, corrected"
     exact = True
     continuous = True
@@ -57,7 +57,7 @@ class GivenLambda(Method):
     """Pseudo-inverse solution plus N lambda, whatever t_ref and weights: no optimum, so it is not judged as one."""
 
     name = MinNorm.name
-    guarantee = "A^+ w + N lambda_; failed if these tensions leave the limits, even where others do not"
+    guarantee = "A^+ w + N lambda_; fails if these tensions leave the limits, even if other tensions do not"
     source = MinNorm.source
     exact = False
     options = MinNorm.options

@@ -22,7 +22,8 @@ class OneNorm(Method):
 
     name = "1-norm"
     guarantee = (
-        "the least sum of absolute tensions, at a corner; may jump as cables turn; certificate if there are none"
+        "the least sum of absolute tensions, at a corner of the feasible set; may jump as the directions of cables "
+        "change"
     )
     source = "M. Gouttefarde, J. Lamaury, C. Reichert, T. Bruckmann, IEEE Trans. Robotics 31(6), 2015"
     exact = True

@@ -34,7 +34,7 @@ class PNorm(Method):
     """
 
     name = "p-norm"
-    guarantee = "the unique optimum, continuous; no tensions and a certificate if there are none"
+    guarantee = "the unique optimum, continuous in w"
     source = "C. Gosselin, M. Grenier, Meccanica 46(1), 2011; R. Verhoeven, thesis, Duisburg 2004"
     exact = True
     continuous = True

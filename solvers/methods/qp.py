@@ -43,7 +43,7 @@ class QuadraticProgram(Method):
 
     name = "qp"
     guarantee = (
-        "the unique optimum to the back end's accuracy; a back end's 'infeasible' counts only with a certificate"
+        "the unique optimum to the back end's accuracy; 'infeasible' is confirmed by a certificate of towline's own"
     )
     source = "qpsolvers: S. Caron et al.; OSQP: Stellato et al. 2020; Clarabel: Goulart and Chen 2024"
     exact = False
@@ -113,9 +113,7 @@ class Daqp(Method):
     """Weighted least squares to t_ref inside the limits, by a dual active-set method."""
 
     name = "daqp"
-    guarantee = (
-        "the unique optimum, exact up to rounding, continuous in w; no tensions and a certificate if there are none"
-    )
+    guarantee = "the unique optimum, exact up to rounding, continuous in w"
     source = "DAQP: D. Arnström, A. Bemporad, D. Axehill, IEEE Trans. Autom. Control 67(8), 2022"
     exact = True
     continuous = True

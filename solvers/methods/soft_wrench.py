@@ -37,7 +37,8 @@ class SoftWrench(Method):
 
     name = "soft-wrench"
     guarantee = (
-        "always tensions, Lipschitz in w: the optimum if w is available, else the nearest wrench and a certificate"
+        "always gives tensions, Lipschitz in w: the optimum if w is available, else those of the nearest wrench and a "
+        "certificate"
     )
     source = (
         "A. F. Côté, P. Cardou, C. Gosselin, 'A tension distribution algorithm for cable-driven parallel robots "

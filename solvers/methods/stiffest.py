@@ -32,7 +32,7 @@ class Stiffest(Method):
     """
 
     name = "stiffest"
-    guarantee = "maximises the smallest eigenvalue of the stiffness, to 1e-6; certificate if there are none"
+    guarantee = "maximises the smallest eigenvalue of the stiffness, to 1e-6"
     source = (
         "S. Behzadipour, A. Khajepour, 'Stiffness of cable-based parallel manipulators with application to stability "
         "analysis', J. Mechanical Design 128(1), 2006, for the stiffness; J. E. Kelley, 'The cutting-plane method for "

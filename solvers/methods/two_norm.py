@@ -19,7 +19,7 @@ class TwoNorm(Method):
     """
 
     name = "2-norm"
-    guarantee = "the unique optimum without iteration up to m - rank = 2, continuous; certificate if there are none"
+    guarantee = "the unique optimum, without iteration up to m - rank = 2; continuous in w"
     source = OneNorm.source
     exact = True
     continuous = True

@@ -100,7 +100,8 @@ def errata(account: Account) -> str:
         f"# Errata of {account.paper.source}",
         "",
         "Each entry gives a claim of the paper, the values that were compared, and why the claim is not reproduced. "
-        f"{MEANING} {READ}",
+        f"{MEANING} {READ} In formulas, ddX is the second time derivative of X, and dX is the first or, in entries on "
+        "small changes, a small change of X.",
     ]
     titles = {
         Verdict.DIFFERS: "Printed results that differ, and what is correct",

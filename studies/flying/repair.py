@@ -46,8 +46,8 @@ def _hovering(planned: Plan) -> Claim:
     if proof is not None:
         cables = ", ".join(str(index + 1) for index in proof.binding)
         why = (
-            f"At {proof.time:.2f} s tensions inside {robot.t_min.min():g} N to {robot.t_max.max():g} N are short by "
-            f"{proof.shortfall:.2f} N along a verified direction; the limits of cables {cables} bind, without wind."
+            f"Without wind, at {proof.time:.2f} s, tensions from {robot.t_min.min():g} N to {robot.t_max.max():g} N "
+            f"give {proof.shortfall:.2f} N too little along a verified direction; cables {cables} are at their limits."
         )
     why += (
         f" With any other pairing, the cables would have to pull inward with at least {pull.least:.1f} N to carry the "

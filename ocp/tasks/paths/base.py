@@ -59,7 +59,9 @@ def with_points_of_file(data: dict[str, Any], info: ValidationInfo, wanted: Coll
     return data | read | {"origin": None}
 
 
-FILE_ORIGIN = "where the zero of the file of points is, in the path's frame [m]; default: at the frame's origin"
+FILE_ORIGIN = (
+    "position of the coordinate origin of the file of points in the path's frame [m]; default: the frame's origin"
+)
 PoseOrPosition = Annotated[Pose, BeforeValidator(_with_level_attitude, json_schema_input_type=Pose | Vector3)]
 
 
