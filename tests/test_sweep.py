@@ -82,7 +82,7 @@ def test_the_table_is_that_of_closed_forms(swept):
         else:
             assert row["status"] == "infeasible"
             shortfall = max(margin - low, high - T_MAX + margin)
-            assert str(row["reason"].values).startswith(f"short by {shortfall:.4g}"[:12])
+            assert str(row["reason"].values).startswith(f"{shortfall:.4g} N short of the required wrench")
             assert np.isnan(row["cost"])
     assert feasible == swept.feasible == 5
 
