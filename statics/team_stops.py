@@ -161,12 +161,6 @@ def _pull(robot: Robot, forces: np.ndarray) -> np.ndarray:
     return -(_carriers_of(robot).holds @ forces)
 
 
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the cross products (..., 3), as `np.cross` does, in a quarter of its time."""
-    before, after = [2, 0, 1], [1, 2, 0]
-    return a[..., after] * b[..., before] - a[..., before] * b[..., after]
-
-
 def _least(square: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Return the solution of square systems; if they are singular, nearly that of least norm."""
     size = np.trace(square, axis1=1, axis2=2)[:, None, None]
@@ -328,7 +322,7 @@ def _wrenches_of_forces(robot: Robot, pose: np.ndarray) -> np.ndarray:
     arms = points.rotations(pose[:, 3:])[:, None] @ (robot.attachments - np.array(robot.platform.com))[..., None]
     turn = np.empty((*arms.shape[:2], 6, 3))
     turn[..., :3, :] = np.eye(3)
-    turn[..., 3:, :] = _cross(arms.swapaxes(-1, -2), np.eye(3)).swapaxes(-1, -2)
+    turn[..., 3:, :] = points.cross(arms.swapaxes(-1, -2), np.eye(3)).swapaxes(-1, -2)
     return turn.swapaxes(1, 2).reshape(len(pose), 6, -1)
 
 
@@ -372,7 +366,7 @@ def _limits(
     spin, spun = (points.axial(down @ part) for part in turning[1:])
     force = (down @ (its.mass * (acceleration[..., :3] - np.array(robot.gravity)) - pull)[..., None])[..., 0]
     impulse, change = ((its.inertia @ part[..., None])[..., 0] for part in (spin, spun))
-    moment = change + _cross(spin, impulse) - _cross(its.anchors, (down @ pull[..., None])[..., 0])
+    moment = change + points.cross(spin, impulse) - points.cross(its.anchors, (down @ pull[..., None])[..., 0])
     wrenches = np.concatenate([force, moment], axis=-1)
     speeds, bends = (np.linalg.norm(part[..., :3], axis=-1) for part in (velocity, acceleration))
     tilts, ranges = np.arccos(np.clip(R[..., 2, 2], -1, 1)), zip(robot.t_min, robot.t_max, strict=True)

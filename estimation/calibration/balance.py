@@ -24,7 +24,7 @@ from ...models.robot import Robot
 from ..logs.load_cells import unreadable
 from ..logs.measurements import Measurements, carriers_of, measured_poses
 from .geometry import record_with
-from .motion import Motion, cross, motion_of
+from .motion import Motion, motion_of
 from .parameters import Parameters
 
 OWN = 2e-3  # of the weight: standard deviation of forces that the model lacks
@@ -295,11 +295,11 @@ class Balance:
             raw[..., own : own + 6], raw[..., own + 8] = S[:, i, :, :6], S[:, i, :, 6]
             raw[..., own + 11 : own + 15] = felt[:, :, i]
         raw[..., of.clock + 1] = np.concatenate([pull, np.cross(arm, pull)], axis=1)
-        by_com = mass * np.concatenate([by_arm, cross(arm) @ by_arm - cross(pull)], axis=1)
+        by_com = mass * np.concatenate([by_arm, points.skew(arm) @ by_arm - points.skew(pull)], axis=1)
         raw[..., of.clock + 2 : of.clock + 5] = by_com @ rotation
         by_pose = np.empty((count, 6, 6))
         wrench_by_axes(of_log.record, of_log.poses, self._carriers, np.ascontiguousarray(tensions), by_pose)
-        by_pose[..., 3:] -= by_com @ cross(arm)
+        by_pose[..., 3:] -= by_com @ points.skew(arm)
         raw[..., 13 : of.clock : of.clock // m] -= r[..., None] / (gain * m)
         weighted = inverse_root * (scale / gain)
 

@@ -238,7 +238,7 @@ def _residuals(log: LogPart, frames: Sequence[np.ndarray]) -> tuple[np.ndarray, 
     own = by_pose @ (T[:, None] @ log.rotation)[:, None]  # likewise in the body's axes
     m = log.robot.m
     # A turn of the measured frame is about its origin.
-    about_frame = by_pose[..., 1, :] + _cross((x - t[:, None])[:, None], by_pose[..., 0, :])
+    about_frame = by_pose[..., 1, :] + points.cross((x - t[:, None])[:, None], by_pose[..., 0, :])
     J = np.concatenate([by_pose[..., 0, :], about_frame, own.reshape(*own.shape[:3], 6)], axis=3)  # (S, k, N, 12)
     J, J_locked = J[:, :m], J[:, m:]
     e = run.lengths.reshape(shape).swapaxes(0, 1) - (0.0 if log.counted else log.y.T)
@@ -275,12 +275,6 @@ def _locked(robot: Robot, x: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np.
     turned = [(i, free[0]) for i in range(3) if i != free[0]] if len(free) == 1 else [(1, 0), (2, 0), (2, 1)]
     for i, axis in turned if len(free) < 2 else ():
         values.append(length * apart[..., i, axis])
-        by_turn = length * _cross(apart[..., axis], axes[i])
+        by_turn = length * points.cross(apart[..., axis], axes[i])
         derivatives.append(np.stack([np.zeros_like(by_turn), by_turn], axis=2))
     return np.stack(values, axis=1), np.stack(derivatives, axis=1)
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return a x b of vectors (..., 3), in about 0.6 of the time of `numpy.cross`, with the same bits."""
-    (a0, a1, a2), (b0, b1, b2) = (tuple(v[..., i] for i in range(3)) for v in (a, b))
-    return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ...models import points
 from ...models.robot import Robot
 from ..logs.measurements import Measurements, measured_poses
 from ..logs.smoothing import FEWEST, Parabolas, continuous, widest_parabola, within
@@ -56,7 +57,7 @@ class Motion(NamedTuple):
     @property
     def by_arm(self) -> np.ndarray:
         """Return the derivative of gravity less acceleration by the arm from the platform frame, (N, 3, 3) [1/s^2]."""
-        return -cross(self.spin) - cross(self.rate) @ cross(self.rate)
+        return -points.skew(self.spin) - points.skew(self.rate) @ points.skew(self.rate)
 
 
 def motion_of(robot: Robot, measurements: Measurements) -> Motion:
@@ -124,10 +125,3 @@ def _filled(times: np.ndarray, values: np.ndarray, known: np.ndarray) -> np.ndar
 def _vector_of_product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Return the vector part of the products p q of quaternions (x, y, z, w), (N, 3)."""
     return p[:, 3:] * q[:, :3] + q[:, 3:] * p[:, :3] + np.cross(p[:, :3], q[:, :3])
-
-
-def cross(vectors: np.ndarray) -> np.ndarray:
-    """Return the matrices (N, 3, 3) whose product with v is the cross product of vectors (N, 3) and v."""
-    result = np.zeros((len(vectors), 3, 3))  # np.cross takes ten times as long
-    result[:, [2, 0, 1], [1, 2, 0]], result[:, [1, 2, 0], [2, 0, 1]] = vectors, -vectors
-    return result

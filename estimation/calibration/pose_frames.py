@@ -7,7 +7,7 @@ at home, so that its shift and its turn are hardly correlated.
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .motion import cross
+from ...models import points
 from .parameters import FRAMES, OF_ROBOT
 
 Poses = tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]
@@ -43,7 +43,7 @@ def twists_of(
         by_frames = result[..., FRAMES]
         turn, body = (_by_rotation_vector(change[first : first + 3]) for first in (3, 9))
         by_frames[:, :3, :3], by_frames[:, 3:, 3:6] = np.eye(3), turn
-        by_frames[:, :3, 3:6] = -cross(position - home - change[:3]) @ turn
+        by_frames[:, :3, 3:6] = -points.skew(position - home - change[:3]) @ turn
         before = rotation @ Rotation.from_rotvec(change[9:]).as_matrix().T  # F X, in whose axes B is
         by_frames[:, :3, 6:9], by_frames[:, 3:, 9:] = before, before @ body
         by_frames[:, 3:] = turned @ by_frames[:, 3:]

@@ -13,7 +13,6 @@ from ...core import columns_by_geometry
 from ...models import points
 from ..logs.measurements import Measurements
 from .geometry import Runs, record_with
-from .motion import cross
 from .parameters import OF_ROBOT, Parameters
 
 SEEN = (*range(6), 8)  # parameters of a cable on which its direction depends
@@ -77,7 +76,7 @@ def sightings(
     by_geometry = -W @ np.swapaxes(S[:, :, :3], 0, 1)  # (m, N, 3, 7)
     by_shift = by_geometry[..., 3:6] @ np.swapaxes(rotation, 1, 2)
     arms = np.einsum("nij,mj->mni", rotation, table[:, 3:6])
-    by_turn = -by_shift @ cross(arms.reshape(-1, 3)).reshape(m, count, 3, 3)
+    by_turn = -by_shift @ points.skew(arms)
     of_robot = np.zeros((m, count, 3, OF_ROBOT))
     if carried is not None:
         velocity, rate = carried
