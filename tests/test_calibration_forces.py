@@ -252,6 +252,14 @@ def test_a_log_does_not_tell_mass_from_gains():
     assert "mass" not in result.identifiable
 
 
+def test_tensions_do_not_move_anchors_out_of_the_plane_of_a_planar_robot():
+    log, _ = moving(1, seconds=4)
+    noise = np.random.default_rng(3).normal(0, 1e-3, log.poses.shape) * [0, 1, 0, 1, 0, 1]  # of y, roll and yaw
+    result = calibrate("planar-4", log.changed(poses=log.poses + noise), ("anchors", "offsets", "clock", "mass"))
+    assert result.converged
+    assert [one.correction for one in result.parameters if one.name.endswith("anchor.y")] == [0.0] * 4
+
+
 @pytest.mark.parametrize("name", ["caroca-pulleys", "planar-4", "cogiro"])
 def test_gradients_are_slopes_of_the_cost(name):
     robot, draw, count = load(name), np.random.default_rng(0), 9

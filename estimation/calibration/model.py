@@ -171,7 +171,7 @@ class Model(Displayed):
         """Return what derivatives by ends of cables are multiplied by, so that ends stay in their plane, (m, 6, 6)."""
         given = self.measurements
         leave = given.carrier_poses is not None or given.directions is not None
-        return np.eye(6) if leave else in_plane(self.parameters)
+        return np.broadcast_to(np.eye(6), (self.robot.m, 6, 6)) if leave else in_plane(self.parameters)
 
     @cached_property
     def _forces(self) -> Balance:
@@ -339,6 +339,9 @@ class Model(Displayed):
         by_pose = by_length * run.by_pose
         cables = np.empty((m, len(position), OF_CABLE))
         cables[..., :6] = by_length * (run.by_geometry[..., :6] @ self._in_plane)
+        if forces is not None and forces.by_parameters is not None:  # of which forces know no more than lengths do
+            ends = forces.by_parameters[..., : parameters.clock].reshape(len(position), 6, m, OF_CABLE)[..., :6]
+            ends[:] = np.einsum("nkci,cij->nkcj", ends, self._in_plane)
         cables[..., 6] = -gain
         cables[..., 7] = -gain * (excess / scale if self.size_is_open else y)
         cables[..., 8] = by_length[..., 0] * run.by_geometry[..., 6]
