@@ -31,9 +31,12 @@ def slack(model: Model, state: State) -> np.ndarray:
 
     Their readings would be those of longer cables, which looks like stretch of the others.
     """
-    at_rest = model.forces is not None and model.forces.at_rest
-    tensions = carrying(model, state) if at_rest and np.isinf(model.pose_sigmas).any() else None
-    return np.zeros(model.weights.shape, dtype=bool) if tensions is None else hardly_pull(tensions.tensions).T
+    none = np.zeros(model.weights.shape, dtype=bool)
+    # Whether it is at rest follows from accelerations, which take memory for a long log.
+    if model.forces is None or not np.isinf(model.pose_sigmas).any() or not model.forces.at_rest:
+        return none
+    tensions = carrying(model, state)
+    return none if tensions is None else hardly_pull(tensions.tensions).T
 
 
 def without_slack(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:

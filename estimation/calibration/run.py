@@ -72,17 +72,17 @@ def calibrate(
     solved = solve(chosen, given, groups, first, outliers)
     forces = solved.model.forces
     of_forces = [name for name in groups if name in (*IN_BALANCE, "elasticity")]
-    is_known = forces is None or forces.motion_is_known
-    if given.times is None and of_forces and not is_known:
-        raise InputError(
-            f"measurements.times must be given to estimate {', '.join(of_forces)}, got none, and the poses look like "
-            "those of a motion; if they are at rest, give times more than 0.2 s apart"
-        )
-    if "elasticity" in groups and given.tensions is None and not is_known:
-        raise InputError(
-            "measurements.poses must be known throughout a motion to estimate elasticity without tensions, got "
-            f"{int(tracked(chosen, given).sum())} of {len(given)}: longer gaps and open ends hide accelerations"
-        )
+    if of_forces and forces is not None and not forces.motion_is_known:
+        if given.times is None:
+            raise InputError(
+                f"measurements.times must be given to estimate {', '.join(of_forces)}, got none, and the poses look "
+                "like those of a motion; if they are at rest, give times more than 0.2 s apart"
+            )
+        if "elasticity" in groups and given.tensions is None:
+            raise InputError(
+                "measurements.poses must be known throughout a motion to estimate elasticity without tensions, got "
+                f"{int(tracked(chosen, given).sum())} of {len(given)}: longer gaps and open ends hide accelerations"
+            )
     if first != priors:
         priors = errors_of_file(solved, priors)
         solved = solve(chosen, given, groups, priors, outliers)
