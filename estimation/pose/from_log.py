@@ -254,14 +254,15 @@ def _tracked(robot: Robot, lengths: np.ndarray, carriers: np.ndarray, sigma: np.
 
 def _by_more(robot: Robot, given: Measurements, sigma: np.ndarray, begin: float, oriented: bool) -> LogPoses:
     """Return poses by lengths, directions of cables and, if `oriented`, measured orientations; by least squares."""
-    from ..calibration.attitudes import misread_attitudes
     from ..calibration.balance import needs_balance
     from ..calibration.sightings import sighted
 
     measured = given.changed(sigma=given.sigma._asdict() | {"lengths": float(sigma.min())})
-    misread = misread_attitudes(robot, measured) if oriented else None
-    corrected = misread.corrected if misread else None
-    measured = (measured if corrected is None else corrected) if oriented else measured.changed(poses=None)
+    found, misread = mistake(robot, measured), None
+    if not oriented:
+        measured = measured.changed(poses=None)
+    elif found and found.corrected and np.array_equal(found.corrected.lengths, measured.lengths):
+        misread, measured = found.text, found.corrected  # of the orientations, not of the lengths
     weights = sigma.min() / sigma
     blocks = [_block(robot, measured.only(slice(k, k + BLOCK)), weights) for k in range(0, len(given), BLOCK)]
     parts = (np.concatenate(part) for part in zip(*blocks, strict=True))
@@ -286,9 +287,7 @@ def _by_more(robot: Robot, given: Measurements, sigma: np.ndarray, begin: float,
         by_parameters=by_parameters if hanging and robot.uncertainty else None,
     )
     times = None if given.times is None else given.times + begin
-    if misread is not None and corrected is not None:
-        return LogPoses(estimate, times, squares / excess**2, more, excess, misread.text)
-    return LogPoses(estimate, times, squares / excess**2, more, excess, mistake=mistake(robot, given))
+    return LogPoses(estimate, times, squares / excess**2, more, excess, misread, None if misread else found)
 
 
 def _block(robot: Robot, measured: Measurements, weights: np.ndarray) -> tuple[np.ndarray, ...]:
