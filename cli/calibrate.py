@@ -8,7 +8,7 @@ import typer
 
 from ..base.errors import InputError
 from ..base.inputs import check_ending
-from .log import FieldsOption
+from .log import FieldsOption, FixOption
 from .options import FormatOption, JsonOption, ReportOption, RobotArgument, parameters
 from .outputs import Outputs, check_outputs
 
@@ -28,7 +28,6 @@ from .outputs import Outputs, check_outputs
         [rad], tensions (relative), directions [rad] and clocks of carriers [s], such as 'lengths=0.001,tensions=0.05';
         default: those in the log; without them, lengths=0.001,tensions=0.02,directions=0.02 and exact poses.
     --outliers/--no-outliers: Detect outliers and slipped winches.
-    --fix: Correct probable input errors of the log first (order of cables, units, conventions, frames).
     --out FILE.yaml: Robot file to write; default: ROBOT-calibrated.yaml in this folder.
     --figures FOLDER: Folder for figures of residuals, anchors and standard deviations.
 """)
@@ -41,7 +40,7 @@ def calibrate(
     prior: str | None = None,
     sigma: str | None = None,
     outliers: bool = True,
-    fix: bool = False,
+    fix: FixOption = False,
     out: Path | None = None,
     figures: Path | None = None,
     form: FormatOption = "png",
@@ -56,10 +55,9 @@ def calibrate(
     than with the robot's file. --fix corrects input errors of the log.
     """
     from ..estimation.calibration import calibrate as find
-    from ..estimation.calibration.correction import correction_of
+    from ..estimation.calibration.correction import corrected_log
     from ..estimation.calibration.solving import usual
     from ..estimation.logs import read_log
-    from ..estimation.logs.clocks import realigned
     from ..models import load
 
     names = None if free is None else [name.strip() for name in free.split(",")]
@@ -72,16 +70,13 @@ def calibrate(
     check_outputs(files, {**{f"the log {log}": log for log in logs}, "--poses": poses})
     check_ending("--out", target, ".yaml", ".yml")
     read = read_log(logs, stated, poses, loaded, fields)
-    measurements, notes, clock = read.measurements, read.notes, read.clock
-    del read  # with the files
     if fix:
-        loaded, measurements, texts, counted = correction_of(loaded, measurements)
-        notes.extend(f"corrected: {text}" for text in texts)
-        if clock is not None and texts:
-            measurements, clock = realigned(loaded, measurements)
-            notes.extend(f"aligned again after this: {clock}" for _ in range(clock is not None))
-        if counted and names is None:
-            names = [*usual(loaded, measurements), "scales"]
+        read, correction = corrected_log(loaded, read)
+        loaded = correction.robot
+        if correction.counted and names is None:
+            names = [*usual(loaded, read.measurements), "scales"]
+    measurements, notes = read.measurements, read.notes
+    del read  # with the files
     if not as_json:
         for note in notes:
             typer.echo(f"  {note}")

@@ -15,6 +15,13 @@ FieldsOption = Annotated[
     ),
 ]
 
+FixOption = Annotated[
+    bool,
+    typer.Option(
+        "--fix", help="Correct probable input errors of the log first (order of cables, units, conventions, frames)."
+    ),
+]
+
 
 @parameters("""
     LOG: CSV, NetCDF or MCAP files, or bags of ROS 1 (.bag) or ROS 2 (folder).

@@ -10,7 +10,7 @@ import typer
 from ..base.errors import InputError
 from ..base.inputs import check_ending
 from .calibrate import by_name
-from .log import FieldsOption
+from .log import FieldsOption, FixOption
 from .options import (
     CarrierPoseOption,
     FormatOption,
@@ -48,6 +48,7 @@ def pose(
     lengths: str | None = None,
     log: list[Path] | None = None,
     fields: FieldsOption = None,
+    fix: FixOption = False,
     out: Path | None = None,
     figures: Path | None = None,
     form: FormatOption = "png",
@@ -69,11 +70,11 @@ def pose(
     if (lengths is None) == (log is None):
         raise InputError("one of --lengths and --log must be given, got " + ("none" if log is None else "both"))
     if log is None:
-        left_out({"--out": out, "--figures": figures, "--fields": fields}, "with --lengths")
+        left_out({"--out": out, "--figures": figures, "--fields": fields, "--fix": fix}, "with --lengths")
     else:
         left_out({"--start": start, "--carrier-pose": carrier_pose}, "with --log")
         target, outputs = out or Path(f"{log[0].stem}-poses.csv"), Outputs(as_json, figures, form)
-        _of_log(loaded, log, fields, sigma, target, outputs)
+        _of_log(loaded, log, fields, sigma, target, outputs, fix)
         return
     assert lengths is not None
     measured = numbers("--lengths", lengths, loaded.m)
@@ -92,11 +93,14 @@ def pose(
         raise typer.Exit(1)
 
 
-def _of_log(robot: Robot, logs: list[Path], fields: Path | None, sigma: str, out: Path, outputs: Outputs) -> None:
-    """Write the poses of a log."""
+def _of_log(
+    robot: Robot, logs: list[Path], fields: Path | None, sigma: str, out: Path, outputs: Outputs, fix: bool
+) -> None:
+    """Write the poses of a log, without its input errors if `fix` is true."""
     import numpy as np
 
     from ..base.text import quantity
+    from ..estimation.calibration.correction import corrected_log
     from ..estimation.logs import Sigma, read_log
     from ..estimation.pose.from_lengths import SIGMA
     from ..estimation.pose.from_log import poses_from_log
@@ -109,6 +113,9 @@ def _of_log(robot: Robot, logs: list[Path], fields: Path | None, sigma: str, out
     sigma = str(stated.get("lengths", SIGMA)) if stated else sigma
     deviations = numbers("--sigma", sigma, robot.m if len(sigma.replace(",", " ").split()) > 1 else 1)
     read = read_log(logs, stated or None, None, robot, fields)
+    if fix:
+        read, correction = corrected_log(robot, read)
+        robot = correction.robot
     found = poses_from_log(robot, read.measurements, deviations if len(deviations) > 1 else deviations[0], read.begin)
     files = [found.save(out)]
     if picture is not None:

@@ -16,7 +16,7 @@ import typer
 from ..base.errors import InputError
 from ..base.inputs import check_ending, one_of, printable, shown
 from ..base.processors import one_thread_each
-from .log import FieldsOption
+from .log import FieldsOption, FixOption
 from .options import (
     FPS,
     SPEED,
@@ -106,6 +106,7 @@ def simulate(
     replay: bool = False,
     poses: Path | None = None,
     fields: FieldsOption = None,
+    fix: FixOption = False,
     drive: str | None = None,
     delay: float = 0.0,
     window: float = WINDOW,
@@ -125,8 +126,8 @@ def simulate(
     if runs is None:
         many = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint, "--resume": resume}
         left_out(many, "without --runs: it is an option for many runs", got=False)
-    of_log = {"--replay": replay, "--poses": poses, "--fields": fields, "--drive": drive, "--fit": fit}
-    of_log |= {"--delay": delay, "--window": window != WINDOW}
+    of_log = {"--replay": replay, "--poses": poses, "--fields": fields, "--fix": fix}
+    of_log |= {"--drive": drive, "--fit": fit, "--delay": delay, "--window": window != WINDOW}
     from ..estimation.logs.opening import is_recording
 
     if replay or is_recording(plan):
@@ -134,7 +135,7 @@ def simulate(
         of_plan |= {"--noise": noise, "--mismatch": mismatch, "--event": event, "--duration": duration}
         of_plan |= {"--seed": seed, "--runs": runs, "--animate": animate}
         left_out(of_plan, "with a recording")
-        options = {"poses": poses, "fields": fields, "drive": drive, "delay": delay, "window": window}
+        options = {"poses": poses, "fields": fields, "fix": fix, "drive": drive, "delay": delay, "window": window}
         replay_log(robot, plan, options | {"tolerance": tolerance}, out, fit, Outputs(as_json, figures, form, report))
         return
     left_out(of_log, "without a recording")
@@ -233,7 +234,7 @@ def replay_log(
     try:
         result = replay(loaded, log, fit=fit is not None, **options)
     except InputError as error:
-        option = "--" * str(error).startswith(("drive ", "delay ", "window ", "tolerance "))
+        option = "--" * str(error).startswith(("fix ", "drive ", "delay ", "window ", "tolerance "))
         raise InputError(f"{option}{error}") from None
     written = {"file": result.save(target)}
     if fit is not None and not result.refused:

@@ -291,6 +291,7 @@ def replay(
     window: float = 0.5,
     tolerance: float | None = None,
     fit: bool = False,
+    fix: bool = False,
 ) -> Replay:
     """Replay a recording: simulate its commands, in windows that each start from the recorded state.
 
@@ -304,6 +305,7 @@ def replay(
         tolerance: Largest position residual for a pass, of 95 % of the samples [m]; default: 0.05 m, or 5 % of the mean
             cable length at home if that is less.
         fit: True to fit parameters to half of the windows, and to validate them on the other half.
+        fix: True to correct probable input errors of the log first (order of cables, units, conventions, frames).
 
     Raises:
         InputError: If an argument has a wrong value, the log cannot be read, or lacks what a replay needs.
@@ -313,7 +315,8 @@ def replay(
     late, lasting = number("delay", delay, -LATEST, LATEST), number("window", window, 0.05, 10.0)
     fits, the_robot = flag("fit", fit), as_robot(robot)
     largest = tolerance_of(the_robot, tolerance)
-    windows = Windows(read_recorded(the_robot, log, poses, fields), drive, lasting)
+    recorded = read_recorded(the_robot, log, poses, fields, flag("fix", fix))
+    windows = Windows(recorded, drive, lasting)
     matching = Matching(windows, windows.usual._replace(delay=late))
     found = matching.explanations(matching.first, matching.kept)
     explained = None

@@ -135,7 +135,13 @@ def test_an_input_error_of_a_log_with_poses_is_said_as_by_calibrate(robot, tmp_p
     doubt = json.loads(done.stdout)["doubt"]
     refused = json.loads(towline("calibrate", robot, "log.csv", "--json", cwd=tmp_path, code=1).stdout)["doubt"]
     assert refused in doubt
-    assert "towline calibrate --fix" in doubt
+    assert doubt.endswith("; --fix corrects it")
+    if error == "exchanged":
+        told = json.loads(towline("pose", robot, "--log", "log.csv", "--fix", "--json", cwd=tmp_path).stdout)
+        assert told["doubt"] is None
+        assert told["notes"] == [f"corrected: {refused}"]
+        rows = np.loadtxt(tmp_path / "log-poses.csv", delimiter=",", skiprows=1)
+        assert np.abs(rows[:, 1:4] - poses[:, :3]).max() < 6 * NOISE
     assert {"exchanged": "l2 and l5 look exchanged", "inverted": "inverted", "millimetres": "millimetres"}[
         error
     ] in doubt

@@ -342,6 +342,7 @@ VALID: dict[str, Callable[[], Any]] = {
     "replay.poses": lambda: None,
     "window": lambda: 0.1,
     "fit": lambda: False,
+    "fix": lambda: False,
     "simulation_of.plant": lambda: a_run()[0],
     "history": lambda: a_run()[1],
     "simulation_of.reference": lambda: None,

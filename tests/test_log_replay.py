@@ -13,6 +13,7 @@ import xarray as xr
 
 from towline import InputError, load, simulate, tensions
 from towline.control import LengthControl
+from towline.estimation.logs.recorded import read_recorded
 from towline.models.cable import Winch
 from towline.plant import Plant
 from towline.simulation import Replay, replay
@@ -196,6 +197,23 @@ def test_an_input_error_of_the_log_is_named(wrong, text, tmp_path):
     assert not result.passed
     assert "the log probably has an input error: " in report
     assert text in report
+
+
+def test_a_corrected_log_is_replayed_as_if_it_were_right(tmp_path):
+    """The columns of all cables are in another order, also of their commands, and the lengths in millimetres."""
+    found = columns("tensions", every("tensions", 50))
+    found |= {f"tension_cmd_{i} [N]": found[f"tension_{i} [N]"] for i in range(4)}
+    right = read_recorded("planar-4", written(tmp_path / "right.csv", found))
+    for name in ("l{} [m]", "tension_{} [N]", "tension_cmd_{} [N]"):
+        found |= {name.format(i): found[name.format(k)] for i, k in enumerate((1, 0, 2, 3))}
+    found |= {f"l{i} [m]": 1e3 * found[f"l{i} [m]"] for i in range(4)}
+    corrected = read_recorded("planar-4", written(tmp_path / "wrong.csv", found), fix=True)
+    assert corrected.doubt is None
+    assert [note for note in corrected.notes if re.match("corrected: .*millimetres.* l0 and l1 look exchanged", note)]
+    for name in ("times", "pose", "lengths", "tensions", "commands"):
+        np.testing.assert_allclose(getattr(corrected, name), getattr(right, name), rtol=1e-12, err_msg=name)
+    with pytest.raises(InputError, match="fix must be False for a robot whose carriers move, as those of multi-"):
+        replay("multi-quadrotor-3", tmp_path / "wrong.csv", fix=True)
 
 
 def test_positions_that_were_not_measured_are_no_small_errors(tmp_path):

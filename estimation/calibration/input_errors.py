@@ -20,19 +20,21 @@ class Mistake(NamedTuple):
         corrected: Measurements without it, or None if several errors are equally probable.
         severe: True if a calibration would be wrong, False if it would only mean a frame other than the file's.
         factors: Factors of the readings in `corrected`, (m,) or one for all cables.
+        columns: Columns of the log in the order of the cables, (m,), or None if it is theirs.
     """
 
     text: str
     corrected: Measurements | None
     severe: bool = True
     factors: np.ndarray | float = 1.0
+    columns: np.ndarray | None = None
 
     __repr__ = record
 
     @property
     def doubt(self) -> str | None:
         """Return the error and how to correct it, in one line, None if it only means another frame."""
-        hint = "; `towline calibrate --fix` corrects it" if self.corrected else ""
+        hint = "; --fix corrects it" if self.corrected else ""
         return f"the log probably has an input error: {self.text}{hint}" if self.severe else None
 
 

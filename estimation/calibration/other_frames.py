@@ -125,8 +125,9 @@ def _of_frames(log: Unexplained, order: np.ndarray, rivals: int, found: _Framed)
             other = with_order("", better[0], same)
             return Mistake(f"{text}; or {other}, in other frames that are simpler or fit better", None)
     factors = way.signs * way.way.factor
-    corrected = corrected_to(log.given, placed, order[way.columns], factors, frames.found)
-    return Mistake(text, corrected, factors=factors)
+    columns = order[way.columns]
+    corrected = corrected_to(log.given, placed, columns, factors, frames.found)
+    return Mistake(text, corrected, factors=factors, columns=columns)
 
 
 def displaced(log: LogPart, given: Measurements, noise: float) -> Mistake | None:

@@ -75,7 +75,7 @@ def _without_frames(log: Unexplained) -> Mistake:
         text = f"{text}; but something else explains them nearly as well: {rival.text}"
     several = best.several or open_
     corrected = None if several else corrected_to(log.given, log.whole.at(best.way), best.columns, factors)
-    return Mistake(text, corrected, factors=factors)
+    return Mistake(text, corrected, factors=factors, columns=best.columns)
 
 
 def _too_large(robot: Robot, given: Measurements, readings: np.ndarray) -> Mistake | None:

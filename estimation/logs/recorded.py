@@ -12,6 +12,7 @@ from ...base.display import Displayed
 from ...base.errors import InputError
 from ...models.files import AnyRobot, as_robot
 from ...models.robot import Robot
+from ..calibration.correction import corrected_log
 from ..calibration.plausibility import mistake
 from ..pose.from_log import poses_from_log
 from .carrier_poses import carriers_at, filled
@@ -49,16 +50,25 @@ class Recorded(Displayed):
 
 
 def read_recorded(
-    robot: AnyRobot, log: Paths, poses: Paths | None = None, fields: str | os.PathLike[str] | None = None
+    robot: AnyRobot,
+    log: Paths,
+    poses: Paths | None = None,
+    fields: str | os.PathLike[str] | None = None,
+    fix: bool = False,
 ) -> Recorded:
     """Read the motion and the commands of a robot from a log.
 
     - `robot`: the robot; its moving carriers are found by their names.
     - `log`, `poses`, `fields`: as `path`, `poses` and `fields` of `read_measurements`.
+    - `fix`: True to correct probable input errors of the log, also in its commands and with the encoders of the robot.
 
-    Raises `InputError` as `read_measurements`, and if the log has no times.
+    Raises `InputError` as `read_measurements`, if the log has no times, or with `fix` as `corrected` and if carriers
+    move.
     """
     known = as_robot(robot)
+    columns: slice | np.ndarray = slice(None)  # of the log, in the order of the cables
+    if fix and any(carrier.moves for carrier in known.carriers):
+        raise InputError(f"fix must be False for a robot whose carriers move, as those of {known.name}, got True")
     try:
         read = read_log(log, None, poses, known, fields, carriers=False)
         if read.fields.directions and not read.fields.position:  # from which poses follow
@@ -73,6 +83,9 @@ def read_recorded(
             raise InputError("must have times for a replay, got none")
         if measured.m != known.m:
             raise InputError(f"must have a length for each of the {known.m} cables of {known.name}, got {measured.m}")
+        if fix:
+            read, correction = corrected_log(known, read)
+            known, measured, columns = correction.robot, read.measurements, correction.columns
         times, notes = measured.times + read.begin, list(read.notes)
         found = command_fields(read.recordings, given, known.m, [carrier.name for carrier in known.carriers])
         reader = Reader(found)
@@ -82,7 +95,7 @@ def read_recorded(
                 return None
             if len(which) != size:
                 raise InputError(f"{which[0].full} must be one of {size} fields, got {len(which)}")
-            return filled(times, reader.stream(which), which[0])
+            return filled(times, reader.stream(which), which[0])[:, columns]
 
         efforts = at(found.efforts, known.m) if measured.tensions is None else None
         commands, is_length = at(found.commands, known.m), bool(found.commands) and found.commands[0].unit in LENGTHS
