@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
-from towline import load
+from towline import Robot, load
 from towline.ocp.planner import Planner
 from towline.ocp.proofs.infeasible_ends import infeasible_ends
 
@@ -63,10 +63,10 @@ def test_the_reason_is_stated():
     assert sum("no attitude in the tube keeps all distances" in proof for proof in proofs) >= 2
 
 
-def short_at(robot, pose, turns, mass=0.0, load_com=(0, 0, 0)):
+def short_at(robot, pose, turns, mass=0.0, load_com=(0, 0, 0), push=(0, 0, 0)):
     """Return the least largest wrench error of tensions inside their limits at rest, in weights, by linear programs.
 
-    A load has its `mass` [kg] and its CoM in the platform frame [m].
+    A load has its `mass` [kg] and its CoM in the platform frame [m]; the air exerts `push` on the CoM [weights].
     """
     arms, com, m = robot.attachments, np.array(robot.platform.com), robot.m
     ratio, up, found = mass / robot.platform.mass, np.array([0.0, 0.0, 1.0]), []
@@ -74,12 +74,39 @@ def short_at(robot, pose, turns, mass=0.0, load_com=(0, 0, 0)):
         way = robot.home_anchors - pose[:3] - arms @ R.T
         way /= np.linalg.norm(way, axis=1)[:, None]
         A = np.hstack([way, np.cross((arms - com) @ R.T, way) / robot.length]).T / robot.weight
-        w = np.append((1 + ratio) * up, np.cross(R @ (load_com - com), ratio * up) / robot.length)
+        w = np.append((1 + ratio) * up - push, np.cross(R @ (load_com - com), ratio * up) / robot.length)
         error = np.full((6, 1), -1.0)
         rows, right = np.block([[A, error], [-A, error]]), np.concatenate([w, -w])
         limits = [*zip(robot.t_min, robot.t_max, strict=True), (0, None)]
         found.append(linprog([0.0] * m + [1.0], A_ub=rows, b_ub=right, bounds=limits).fun)
     return np.array(found)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_ends_without_tensions_in_wind_at_any_attitude_are_proven(seed):
+    """Attitudes drawn at random have tensions in none, or not in all, of the winds: one wind, or those of a disc."""
+    rng = np.random.default_rng([31, seed])
+    data = load("cogiro" if seed % 2 else "ipanema-1").model_dump(mode="json")
+    data["platform"]["aero"] = {"air_density": 1.2, "drag": 0.8, "lift": 0.1, "area": 2.0}
+    robot, turn = Robot.model_validate(data), float(rng.uniform(0.02, 0.1))
+    speed = float(np.sqrt((0.8 + seed % 2) * robot.weight / (0.5 * 1.2 * 2.0 * 0.8)))
+    end = robot.home.copy()
+    end[:2] += 0.3 * np.abs(robot.home_anchors[:, :2]).max(axis=0) * rng.uniform(-1, 1, 2)
+    winds = [speed * np.array([np.cos(a), np.sin(a), 0.0]) for a in np.linspace(0, 2 * np.pi, 17)[:-1]]
+    winds = winds[seed : seed + 1] if seed < 2 else winds
+    turns = np.vstack([np.zeros(3), rng.uniform(-turn, turn, (4, 3))])
+    worst = np.zeros(len(turns))
+    for V in winds:
+        push = 0.5 * 1.2 * 2.0 * np.append(0.8 * V[:2] * np.abs(V[:2]), 0.1 * V @ V) / robot.weight
+        worst = np.maximum(worst, short_at(robot, end, turns, push=push))
+    line = {"kind": "line", "start": robot.home.tolist(), "end": end.tolist()}
+    task = {"path": line, "duration": 9, "tube": {"position": "free", "attitude": turn}}
+    task["wind"] = winds[0].tolist() if seed < 2 else {"speed": speed}
+    proof = infeasible_ends(Planner(robot, task).scenario)
+    if worst.min() < 1e-9:
+        assert proof is None
+    elif worst.min() > 0.02:
+        assert "no attitude in the tube has feasible tensions at rest" in proof.describe()
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -599,3 +599,19 @@ def test_a_path_below_the_floor_with_cables_that_pull_too_hard_is_shifted_and_ha
     assert shift.possible == pytest.approx(0.05, rel=2e-3)
     assert again(shift).feasible
     assert again(shift).scenario.robot.t_min.max() == pytest.approx(t_min.possible, rel=1e-3)
+
+
+def test_a_way_round_leads_a_cycle_past_a_ball():
+    """Only the whole path ends where it starts, not each of its legs; a corner that moves is both its ends."""
+    x, y, z, *level = load("planar-4").home.tolist()
+    corners = [[x + dx, y, z + dz, *level] for dx, dz in ((0.2, 0.1), (-0.2, 0.1), (0, -0.1), (0.2, 0.1))]
+    ball = {"kind": "sphere", "name": "ball", "radius": 0.02, "cables": None}
+    task = {"path": {"kind": "waypoints", "points": corners}, "duration": 6, "tube": {"ends": "periodic"}}
+    for dx in (0.0, 0.2):
+        its = task | {"limits": {"keep_out": [ball | {"centre": [x + dx, y, z + 0.1]}]}}
+        first = plan("planar-4", its).relaxations[0]
+        assert first.name == ("shift of path.points[0]" if dx else "length of a way round")
+        assert first.plan.feasible
+        points = first.plan.scenario.task.path.points
+        assert points[0] == points[-1]
+        assert (points[0] == tuple(corners[0])) == (dx == 0)

@@ -188,6 +188,34 @@ def test_no_plan_is_an_answer(tmp_path):
     assert turned.share_of_robots(seed=7).share >= 0.95
 
 
+def test_what_is_offered_to_robots_suffices_for_the_share():
+    """Offered are what the line, the share or the errors must be; robots drawn apart from it agree."""
+    robot = known("wang-flying", 0.0012)
+    found = plan(robot, HOVER | {"duration": 1.0, "robust": 0.95})
+    assert found.status.value == "not-found"
+    offers = {offer.name: offer for offer in found.relaxations}
+    assert offers.keys() == {"length of the line", "robust", "uncertainty"}
+    for name, offer in offers.items():
+        its = offer.plan
+        assert its.feasible
+        share = offer.possible if name == "robust" else 0.95
+        assert its.scenario.task.robust == its.robust.share == share
+        assert its.share_of_robots(count=60, seed=7).share >= share
+        assert (its.scenario.robot == robot) == (name != "uncertainty")
+    less = offers["uncertainty"].plan.scenario.robot.uncertainty
+    assert less.matrix == pytest.approx(offers["uncertainty"].possible ** 2 * robot.uncertainty.matrix)
+
+
+def test_a_plan_that_is_infeasible_for_the_file_too_has_offers_for_robots():
+    robot = known("cogiro", 0.02, t_max=500.0)
+    line = {"kind": "line", "start": [-3, 0.5, 1.5, 0, 0, 0], "end": [3, 0.5, 1.5, 0, 0, 0]}
+    (offer,) = plan(robot, {"path": line, "duration": 2.2, "robust": 0.95}).relaxations
+    assert offer.name == "duration"
+    assert offer.plan.feasible
+    assert offer.plan.scenario.robot == robot
+    assert offer.plan.share_of_robots(count=40, seed=7).share >= 0.95
+
+
 def test_robots_that_weigh_little_keep_their_limits_too():
     """The same robot with a millionth of all forces has the same answer."""
     data = known("wang-flying", 0.01).model_dump()

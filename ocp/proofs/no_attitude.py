@@ -3,8 +3,9 @@
 Where the tube leaves a platform its attitude, but the task fixes the position where it rests, the attitudes are a box
 of angles. A distance changes by no more than points of the platform move, so one that is short enough proves a whole
 small box. So does a direction along which the cables cannot give the weight at any corner of the box, if they lack more
-there than a bound on the curvature between the corners could add. Boxes that are not proven are halved along each
-angle, until all are proven or an attitude keeps all distances and has tensions.
+there than a bound on the curvature between the corners could add. A wind's force acts at the CoM and is the same in
+every attitude; of a set of winds, one suffices for each box. Boxes that are not proven are halved along each angle,
+until all are proven or an attitude keeps all distances and has tensions.
 """
 
 from collections.abc import Callable
@@ -15,6 +16,7 @@ from ..audits.excess import TENSIONS, Excess
 from ..audits.tensions import nearest, scaled, tolerance_of
 from ..tasks.paths import Motion
 from ..tasks.scenario import ATTITUDE, Scenario
+from ..tasks.wind_set import possible_winds_at
 
 MOST = 30_000  # boxes
 CERTAIN = 1e-5  # [m], of distances, whose formulas are rounded where things touch
@@ -107,7 +109,10 @@ def _corners(centres: np.ndarray, half: float) -> np.ndarray:
 
 
 def _tensions_at_rest(scenario: Scenario, time: float, carriers: np.ndarray, turned: Turned) -> Tensions | None:
-    """Return the function that computes shortfalls at rest; None where more than the weight has to be held.
+    """Return the function that computes shortfalls at rest; None on the ground or with pulleys.
+
+    Of a set of winds, those come first in which most is missing at the reference attitude, and each only counts where
+    the ones before prove nothing.
 
     Along a direction d = (f, c) of wrenches, cable i gives at most the larger of its limits times x_i = u_i . (f + c x
     r_i), u_i its direction and r_i its arm about the CoM. In a box of size 2 h, x_i differs from a mean of those at the
@@ -116,7 +121,7 @@ def _tensions_at_rest(scenario: Scenario, time: float, carriers: np.ndarray, tur
     """
     robot, at = scenario.robot, np.array([time])
     grounded = scenario.phases.resting(at).any()
-    if scenario.wind is not None or scenario.wind_set is not None or grounded or robot.pulley_radii.any():
+    if grounded or robot.pulley_radii.any():
         return None
     mass, *com = scenario.phases.loads_at(at)[0, :4] if scenario.phases.carry else np.zeros(4)
     turning = mass * np.linalg.norm(robot.gravity) * np.linalg.norm(np.array(com) - robot.platform.com)  # [N m]
@@ -124,19 +129,19 @@ def _tensions_at_rest(scenario: Scenario, time: float, carriers: np.ndarray, tur
     reach, arms = (np.linalg.norm(robot.attachments - at, axis=1) for at in (0.0, np.array(robot.platform.com)))
     least = max(tolerance_of(robot), CERTAIN_FORCE * robot.force_scale)
 
-    def wrenches(offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def wrenches(offsets: np.ndarray, wind: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return wrench matrices (n, 6, m), required wrenches (n, 6) and cable lengths (n, m)."""
         poses, places = turned(offsets), np.repeat(carriers[None], len(offsets), axis=0)
         dynamics, bodies = scenario.dynamics, (Motion.still(poses), Motion.still(places))
-        w = scenario.required_wrench(np.full(len(poses), time), *bodies, None)
+        w = scenario.required_wrench(np.full(len(poses), time), *bodies, wind)
         return (
             scaled(scenario, dynamics.wrench_matrix(poses, places)),
             scaled(scenario, w),
             dynamics.cable_lengths(poses, places),
         )
 
-    def short(centres: np.ndarray, half: float) -> tuple[np.ndarray, np.ndarray]:
-        A, w, lengths = wrenches(centres)
+    def short_in(wind: np.ndarray | None, centres: np.ndarray, half: float) -> tuple[np.ndarray, np.ndarray]:
+        A, w, lengths = wrenches(centres, wind)
         n, k = centres.shape
         closest, away = nearest(A, w, low, high)
         d = (w - np.einsum("nij,nj->ni", A, closest)) / np.maximum(away, least)[:, None]
@@ -144,9 +149,24 @@ def _tensions_at_rest(scenario: Scenario, time: float, carriers: np.ndarray, tur
         per_length = reach / np.maximum(lengths - reach * half * k, 1e-9)  # of attachments' speeds, at most
         second = (f + c * arms) * (per_length + 3 * per_length**2) + c * arms * (1 + 2 * per_length)
         between = k * half**2 / 2
-        A, w = (part.reshape(n, -1, *part.shape[1:]) for part in wrenches(_corners(centres, half))[:2])
+        A, w = (part.reshape(n, -1, *part.shape[1:]) for part in wrenches(_corners(centres, half), wind)[:2])
         x = np.einsum("ncij,ni->ncj", A, d) + (between * second)[:, None]
         lacking = np.einsum("nci,ni->nc", w, d) - np.maximum(low * x, high * x).sum(axis=2)
         return np.where(away > least, away, 0.0), lacking.min(axis=1) - between * turning * c[:, 0] - least
 
+    def short(centres: np.ndarray, half: float) -> tuple[np.ndarray, np.ndarray]:
+        away, certain = np.zeros(len(centres)), np.full(len(centres), -np.inf)
+        for wind in winds:
+            left = np.flatnonzero(certain <= 0)
+            if left.size:
+                values = zip((away, certain), short_in(wind, centres[left], half), strict=True)
+                for most, its in values:
+                    most[left] = np.maximum(most[left], its)
+        return away, certain
+
+    winds: list[np.ndarray | None] = [None if scenario.wind is None else np.array(scenario.wind)]
+    middle = np.zeros((1, 1))  # of all angles
+    if scenario.wind_set is not None:
+        winds = [wind[0] for wind in possible_winds_at(scenario.wind_set, robot, turned(middle), np.zeros((1, 6)))]
+        winds.sort(key=lambda wind: -float(short_in(wind, middle, 0.0)[0][0]))
     return short

@@ -15,6 +15,7 @@ from ..global_path.space import Space
 from ..plan import Plan
 from ..proofs.durations import durations
 from ..result import Relaxed
+from ..tasks.ends import platform_ends
 from ..tasks.lay_out import with_task
 from ..tasks.paths import FeedPath, LinePath, WaypointPath
 from ..tasks.scenario import POSITION, Scenario
@@ -140,7 +141,8 @@ def _way_round(scenario: Scenario, start: np.ndarray, end: np.ndarray) -> np.nda
     tube, limits = scenario.task.tube, scenario.task.limits
     line = LinePath.model_validate({"kind": "line", "start": start.tolist(), "end": end.tolist()})
     given = {} if isinstance(scenario.task.path, LinePath) else {"initial": None, "final": None}
-    leg = {"path": line, "duration": scenario.duration, "tube": tube.model_copy(update={"position": "free"})} | given
+    tube = tube.model_copy(update={"position": "free", "ends": None})  # those of a cycle are not the leg's
+    leg = {"path": line, "duration": scenario.duration, "tube": tube} | given
     free = with_task(scenario, **leg)
     if limits.platform_box is None:
         low, high = Space(free).box
@@ -175,6 +177,8 @@ def _clear_points(scenario: Scenario, points: np.ndarray) -> dict[int, np.ndarra
         beside = others[[near for near in (k - 1, k + 1) if 0 <= near < len(points)]]
         if (place := _nearest(kept, points[k], carriers[k], beside)) is not None:
             moved[k] = others[k] = place
+    if 0 in moved and platform_ends(scenario.task) == "periodic":
+        moved[len(points) - 1] = moved[0]
     return moved
 
 

@@ -82,12 +82,8 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
     """Return feasible variations of what a task does not name: where its path is, the platform's mass, t_max, t_min.
 
     `audit` is that of the motion exactly on the path. Each variation is one change. If there is none, it is a path of
-    the same form near the platform's home, or else several changes together, such as fewer regions. The list is empty
-    for uncertain robots.
+    the same form near the platform's home, or else several changes together, such as fewer regions.
     """
-    task = scenario.task
-    if task.robust is not None:
-        return []
     if by_programs(scenario):
         return _by_a_program(search, scenario, audit)
     fewer = (partial(_fewer_regions, audit=audit),) * _blocked(audit)

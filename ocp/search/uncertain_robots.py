@@ -4,54 +4,63 @@ The tensions of a robot with other anchors and attachments differ from the plann
 spread depends on the plan, so the planner iterates: plan, compute the largest spread of each cable along the plan,
 tighten its limits by this, and plan again from there, until the requested fraction of the robots keeps the limits at
 all audited instants. The spread grows with the tensions, so the limits are tightened by a little more.
+
+If it does not suffice, what is offered is what makes the task of tightened limits feasible, a smaller fraction of the
+robots, or smaller errors of all.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from ...base.text import quantity
-from ...models import Robot
+from ...models import Robot, Uncertainty
 from ...statics.robust import Spread, motion_factor
 from ..audits.excess import Excess
 from ..audits.robust_margin import RobustMargin
 from ..audits.tensions import tolerance_of
 from ..plan import Plan
-from ..result import Offers, PlannerStep
+from ..result import Offers, PlannerStep, Relaxed
 from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
+from ..tasks.task import Task
 
 ROUNDS = 4  # after the plan for the robot of the file; two suffice as a rule
 GROWTH = 1.05  # of what limits are tightened by: the next plan's tensions may be larger
 AT_ONCE = 4096  # instants
 MOST_OF_CURVE = 2000  # instants for the lengths of the curves
+HALVINGS = 3  # of what limits are tightened by, for offers
+FEWEST = 50  # [%] of the robots: plans for fewer are not offered
+LEAST_ERRORS = 5  # [%] of the given ones: smaller ones are not offered
+
+Climb = Callable[[Scenario, Deviation | None], Plan]
+"""Plans a scenario from a start."""
 
 
-def for_robots(first: Plan, share: float, climb: Callable[[Scenario, Deviation | None], Plan]) -> Plan:
-    """Return the plan for a share of the robots, from the `first` one, which counts the robot of the file as exact.
-
-    `climb` plans a scenario from a start.
-    """
+def for_robots(first: Plan, share: float, climb: Climb) -> Plan:
+    """Return the plan for a share of the robots, from the `first` one, which counts the robot of the file as exact."""
     robot, task = first.scenario.robot, first.scenario.task
     plan, stages = judged(first, robot, share), list(first.stages)
     if not first.feasible:
-        return plan
+        return replace(plan, offers=partial(_for_others, first, share, climb))
     spent = np.array([first.build_s, first.solve_s])
-    tightened, reason = np.zeros(robot.m), ""
+    tightened, reason, tried = np.zeros(robot.m), "", [first]
     for _ in range(ROUNDS):
         if plan.robust is None or plan.robust.holds:
             break
         tightened = np.maximum(tightened, GROWTH * plan.robust.reach.max(axis=0))
         cable = int(np.argmax(tightened))
         by = f"limits tightened by up to {quantity(tightened[cable], 'N')} (cable {cable + 1})"
-        narrow = np.flatnonzero(robot.t_min + tightened + task.margin > robot.t_max - tightened - task.margin)
+        narrow = np.flatnonzero(_narrow(robot, tightened, task))
         if narrow.size:
             reason = f"the tension spread exceeds the range of the tension limits of cable {narrow[0] + 1}"
             break
         again = climb(lay_out(_tightened(robot, tightened), task), plan.deviation)
+        tried.append(again)
         stages += [PlannerStep(f"for {quantity(100 * share, '%')} of the robots", by, 0.0), *again.stages]
         spent += again.build_s, again.solve_s
         if not again.feasible:
@@ -60,14 +69,77 @@ def for_robots(first: Plan, share: float, climb: Callable[[Scenario, Deviation |
         plan = judged(again, robot, share)
     else:
         reason = f"the tension spread is still too large after {ROUNDS} rounds"
-    failed = plan.robust is not None and not plan.robust.holds
-    return replace(
-        plan,
-        stages=tuple(stages),
-        build_s=float(spent[0]),
-        solve_s=float(spent[1]),
-        reason=reason if failed else plan.reason,
-    )
+    plan = replace(plan, stages=tuple(stages), build_s=float(spent[0]), solve_s=float(spent[1]))
+    if plan.robust is None or plan.robust.holds:
+        return plan
+    return replace(plan, reason=reason, offers=partial(_near, robot, share, climb, tried, tightened))
+
+
+def _near(robot: Robot, share: float, climb: Climb, tried: list[Plan], tightened: np.ndarray) -> Offers:
+    """Return what makes a task feasible for the robots: what tightened limits need, fewer robots, or smaller errors.
+
+    The latter two are those that one of the `tried` plans allows, or one for limits that are tightened by a part of
+    (m,) [N].
+    """
+    task, last = tried[0].scenario.task, tried[-1]
+    made = Offers() if last.feasible else _that_hold(last, robot, share)
+    found = [*made.found]
+    plans, low, high = [plan for plan in tried if plan.feasible], 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        by = middle * tightened
+        again = None if _narrow(robot, by, task).any() else climb(lay_out(_tightened(robot, by), task), None)
+        if again is not None and again.feasible:
+            plans.append(again)
+            low = middle
+        else:
+            high = middle
+    if most := _most(plans, lambda plan, part: judged(plan, robot, part), FEWEST, int(np.ceil(100 * share))):
+        found.append(Relaxed("robust", "", share, *most))
+    if most := _most(plans, lambda plan, part: judged(plan, _surer(robot, part), share), LEAST_ERRORS, 100):
+        found.append(Relaxed("uncertainty", "", 1.0, *most, "of its standard deviations"))
+    return Offers(found, made.cut_short)
+
+
+def _most(
+    plans: list[Plan], judge: Callable[[Plan, float], Plan], least: int, beyond: int
+) -> tuple[float, Plan] | None:
+    """Return the largest fraction, in per cent from `least` to less than `beyond`, with which a plan is feasible."""
+    best: tuple[float, Plan] | None = None
+    low = least - 1
+    for plan in plans:
+        high = beyond
+        while high - low > 1:
+            middle = (low + high) // 2
+            held = judge(plan, middle / 100)
+            low, high = (middle, high) if held.feasible else (low, middle)
+            best = (middle / 100, held) if held.feasible else best
+    return best
+
+
+def _for_others(first: Plan, share: float, climb: Climb) -> Offers:
+    """Return what makes a task feasible for the robots that is not even so for the robot of the file."""
+    robot, task = first.scenario.robot, first.scenario.task
+    held = _that_hold(first, robot, share)
+    plans = (judged(offer.plan, offer.plan.scenario.robot, share) for offer in first.relaxations)
+    spread = next((GROWTH * plan.robust.reach.max(axis=0) for plan in plans if plan.robust is not None), None)
+    if held.found or spread is None or _narrow(robot, spread, task).any():
+        return held
+    return _that_hold(climb(lay_out(_tightened(robot, spread), task), None), robot, share)
+
+
+def _that_hold(plan: Plan, robot: Robot, share: float) -> Offers:
+    """Return the offers of a plan, perhaps for tightened limits, that suffice for a share of the robots."""
+    limited, found = plan.scenario.robot.cables, list[Relaxed]()
+    for offer in plan.relaxations:
+        its = offer.plan.scenario.robot
+        if its.cables == limited:
+            its = its.model_copy(update={"cables": robot.cables})
+        elif limited != robot.cables:  # what the cables would need without tightened limits is another number
+            continue
+        held = judged(offer.plan, its, share)
+        found += [replace(offer, plan=held)] if held.feasible else []
+    return Offers(found, plan.cut_short)
 
 
 def judged(plan: Plan, robot: Robot, share: float) -> Plan:
@@ -125,6 +197,19 @@ def _excess(scenario: Scenario, plan: Plan, margin: RobustMargin) -> Excess:
         why += ", since the cables hardly resist some direction"
     side = "at least" if below else "at most"
     return Excess("tension", f"cable {cable + 1}", float(audit.times[row]), value, bound, "N", side, why)
+
+
+def _narrow(robot: Robot, by: np.ndarray, task: Task) -> np.ndarray:
+    """Return for which cables nothing is left between limits that are tightened by (m,) [N], less the margin."""
+    return robot.t_min + by + task.margin > robot.t_max - by - task.margin
+
+
+def _surer(robot: Robot, part: float) -> Robot:
+    """Return the robot whose errors have so much of their standard deviations."""
+    given = robot.uncertainty
+    assert given is not None
+    surer = Uncertainty(parameters=given.parameters, covariance=tuple(map(tuple, part**2 * given.matrix)))
+    return robot.model_copy(update={"uncertainty": surer})
 
 
 def _tightened(robot: Robot, by: np.ndarray) -> Robot:
