@@ -40,8 +40,8 @@ FEWEST_FIT = 0.95  # of the samples of a log
     --out FILE.csv: With --log: file of poses and covariances; default: LOG-poses.csv in this folder.
     --figures FOLDER: With --log: folder for a figure of the residuals over time.
     --start '{SIX}': Pose at which the search starts [m, rad]; default: none is needed.
-    --sigma S: Standard deviation of the lengths [m]: one number, or one per cable; with --log also
-        'lengths=0.001,directions=0.01,rotation=0.01'.
+    --sigma S: Standard deviation of the lengths [m]: one number, or one per cable; with --log also by
+        name: lengths=0.001,rotation=0.01.
 """)
 def pose(
     robot: RobotArgument,

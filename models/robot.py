@@ -257,7 +257,7 @@ class Robot(Part):
 
     @property
     def t_max(self) -> np.ndarray:
-        """Return the largest tensions, (m,) [N]: the file's, or lower ones above which its winches cannot haul in."""
+        """Return the largest tensions, (m,) [N]: the file's or, if less, those at which winches can still haul in."""
         winches = [cable.winch if self.drive != "fixed-length" else None for cable in self.cables]
         most = np.array([winch.tension_max if winch else np.inf for winch in winches])
         return np.minimum([cable.t_max for cable in self.cables], np.maximum(most, self.t_min))  # (m,)

@@ -183,7 +183,7 @@ class Plant:
     def fixed_lengths(self, tensions: np.ndarray) -> np.ndarray | None:
         """Return unstrained lengths, (..., m) [m], of cables that have the file's fixed lengths under `tensions` [N].
 
-        None if the robot has winches, or the plant another drive.
+        None if the robot has winches, or the drive of the plant is not "lengths".
         """
         if self.robot.fixed_lengths is None or self.drive != "lengths":
             return None

@@ -189,7 +189,7 @@ METRICS: dict[str, Metric] = {
         "1", "reciprocal of the condition number", lambda robot, places: 1.0 / _condition_number(robot, places)
     ),
     "tension_factor": Metric(
-        "1", "largest ratio of smallest to largest tension among those that give no wrench", _tension_factor
+        "1", "largest value of smallest / largest tension, over all tensions with A t = 0", _tension_factor
     ),
     "payload": Metric("kg", "largest additional mass at the CoM at rest", _payload),
     "acceleration": Metric("m/s^2", "largest acceleration from rest in every direction", _acceleration),

@@ -50,10 +50,11 @@ class Excess(Displayed):
         at = "" if self.time is None else f" at t = {self.time:.3f} s"
         why = f" ({self.why})" if self.why else ""
         body, _, region = self.about.partition(" outside ")
-        if self.limit == "keep_out" and region and self.value < 0:
+        if self.limit == "keep_out" and region and not np.isnan(self.value):
             required = f" (required distance: {quantity(self.bound, self.unit)})" if self.bound > 0 else ""
-            depth = quantity(-self.value, self.unit)
-            return f"{_named(body)} is {depth} inside the keep-out region {region!r}{at}{required}{why}"
+            side, off = ("inside", -self.value) if self.value < 0 else ("from", self.value)
+            depth = quantity(off, self.unit)
+            return f"{_named(body)} is {depth} {side} the keep-out region {region!r}{at}{required}{why}"
         body, _, room = self.about.partition(WITHIN)
         if room and self.value < 0:
             side = "below" if room == "the floor" else "beyond"

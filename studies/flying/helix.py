@@ -103,8 +103,8 @@ def _positive(dynamics: Dynamics, world: Motion, base: Motion, tensions: np.ndar
         shortfall <= 0 and not excluded,
         otherwise=Verdict.IMPOSSIBLE if excluded else Verdict.NOT_DETERMINED,
         why=f"With any pairing, the cables would have to pull inward with at least {pull.least:.1f} N to carry the "
-        f"weight, but the motion needs only {pull.needed:.2f} N. With crossed pairs, the cables can "
-        f"give {shortfall:.2f} N too little at {TIMES[row]:.1f} s, along a verified direction."
+        f"weight, but the motion needs only {pull.needed:.2f} N. With crossed pairs, tensions that are "
+        f"not negative give {shortfall:.2f} N too little at {TIMES[row]:.1f} s, along a verified direction."
         if excluded
         else "With crossed pairs no tensions give the wrench, which excludes no other pairing.",
     )

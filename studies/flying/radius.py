@@ -67,7 +67,7 @@ def chapter() -> Chapter:
         taut=at_centre().taut.sum(),
         beyond=", ".join(f"{radius:g}" for radius in beyond),
         crossed=taut,
-        kept=f"{kept:.3f} m with at least {floor:g} N",
+        kept=f"or {kept:.3f} m if every tension is at least {floor:g} N",
     )
     drawings = {"radius": _against_radius(dynamics, taut), "depth": _against_depth(dynamics, floor)}
     return Chapter([largest, _inward()], drawings)

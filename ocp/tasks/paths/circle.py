@@ -25,7 +25,9 @@ class CirclePath(PathBase):
         "axis through the centre, of any length; (0, 1, 0) for a circle in front of a wall", (0.0, 0.0, 1.0)
     )
     phase: Finite = optional(
-        "angle at the start, from the x axis projected on the circle's plane, or from y if that is a point [rad]", 0.0
+        "angle at the start, from the x axis projected on the circle's plane, or from the y axis if the axis of the "
+        "circle is x [rad]",
+        0.0,
     )
     drift: Vector3 = optional("velocity of the centre [m/s]", (0.0, 0.0, 0.0))
     attitude: Vector3 = optional("constant attitude (roll, pitch, yaw) [rad]", (0.0, 0.0, 0.0))
