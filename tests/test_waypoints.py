@@ -220,6 +220,16 @@ def test_yaw_takes_the_short_way():
     assert half.at(np.array([2.5]), 5.0).pose[0, 5] == pytest.approx(0, abs=1e-9)
 
 
+def test_motions_asked_for_again_are_the_same_and_their_own():
+    path = WaypointPath(kind="waypoints", points=((0, 0, 1), (2, 0, 1, 0, 0, 1), (2, 2, 2, 0.2, 0, 2)))
+    for last, count in 2 * ((6.0, 50), (7.0, 50), (6.0, 51)):
+        times = np.linspace(0, last, count)
+        alone = path.at(np.append(times, last), last)
+        for part, other in zip(path.at(times, last), alone, strict=True):
+            np.testing.assert_array_equal(part, other[:-1])
+            part += 1.0
+
+
 def test_times_and_dwells_are_kept():
     points = [[0, 0, 1, 0, 0, 0], [1, 0, 1, 0, 0, 0.3], [1, 1, 1, 0, 0, 0.3], [0, 1, 1, 0, 0, 0]]
     timed = path_of(points, times=(0, 1, 3, 4), dwell=(0, 0, 0.5, 0.25), blend=0)

@@ -17,7 +17,7 @@ Lengths combine positions and rotations, with 1 rad equal to 1 m.
 """
 
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from .overlap import MOST, SMOOTHER, USUAL, Overlap, size
 
 BLEND = 0.01  # of the span of the points; accelerations hardly fall with more
 LOOKS = 48  # at the angles of each leg
+MOST_KNOWN = 20_000  # times of a motion that is remembered, of 150 bytes each
 
 
 class Legs:
@@ -98,7 +99,16 @@ class Legs:
         return self.knots(duration)[:-1] + self._dwell[:-1] - self._early * last, last
 
     def at(self, times: np.ndarray, duration: float) -> Motion:
-        """Return the motion of a task that lasts `duration` [s] at `times` [s]."""
+        """Return the motion of a task that lasts `duration` [s] at `times` [s].
+
+        A search near the path asks for the same times again and again: the last few motions are remembered.
+        """
+        if len(times) > MOST_KNOWN:
+            return self.evaluate(times, duration)
+        return Motion(*(part.copy() for part in _remembered(self, times.tobytes(), duration)))
+
+    def evaluate(self, times: np.ndarray, duration: float) -> Motion:
+        """Return what `at` does, without looking whether it is known."""
         start, last = self.legs(duration)
         leg = np.minimum(np.searchsorted(start + last, times, side="right"), len(last) - 1)
         # After the last leg comes one that never starts.
@@ -173,6 +183,11 @@ class Legs:
         s = np.append(0.0, np.cumsum(self._weights))[leg] + weights[leg] * first[0] + weights[leg + 1] * second[0]
         places, angles = self.angles
         return np.stack([np.interp(s, places, column) for column in angles.T], axis=1)
+
+
+@lru_cache(maxsize=8)
+def _remembered(legs: Legs, times: bytes, duration: float) -> Motion:
+    return legs.evaluate(np.frombuffer(times), duration)
 
 
 def _over(law: Overlap, times: np.ndarray, start: np.ndarray, last: np.ndarray) -> Progress:
