@@ -17,6 +17,7 @@ from towline.estimation.logs.recorded import read_recorded
 from towline.models.cable import Winch
 from towline.plant import Plant
 from towline.simulation import Replay, replay
+from towline.simulation.windows import Windows
 
 from .warm import towline as run
 
@@ -421,7 +422,31 @@ def test_wrong_input_is_one_line(robot, text, options, message, tmp_path):
     assert len(done.stderr.strip().splitlines()) == 1
 
 
+@pytest.mark.parametrize(
+    ("kept", "missing"),
+    [
+        ("t|l|x|y|z|roll|pitch|yaw", None),
+        ("t|l|tension", None),
+        ("t|l|roll|pitch|yaw", None),
+        ("t|l", "poses, or tensions or lengths that do not drive the plant"),
+        ("l|tension", "times"),
+    ],
+)
+def test_the_listing_of_a_log_says_whether_it_can_be_replayed(kept, missing, tmp_path):
+    found = columns("tensions", every("tensions", 50))
+    found = {name: one for name, one in found.items() if re.match(rf"({kept})(_?\d)? ", name)}
+    log = written(tmp_path / "log.csv", found)
+    assert json.loads(run("log", log, "--robot", "planar-4", "--json").stdout)["uses"]["replay"] == missing
+    if missing is None:
+        assert len(Windows(read_recorded("planar-4", log), None, 0.5).starts)
+    else:
+        with pytest.raises(InputError, match=f"must have {missing} for a replay, got none"):
+            replay("planar-4", log)
+
+
 def test_a_carrier_without_a_pose_is_named(logs, tmp_path):
     found = {name: one for name, one in columns("thrusts", every("thrusts")).items() if "quad2" not in name}
-    with pytest.raises(InputError, match=r"must have poses of carrier quad2 \(quad2_x, ..., quad2_qw\), got 0"):
-        replay("multi-quadrotor-3", written(tmp_path / "lost.csv", found))
+    log, missing = written(tmp_path / "lost.csv", found), "poses of carrier quad2 (quad2_x, ..., quad2_qw)"
+    with pytest.raises(InputError, match=re.escape(f"must have {missing} for a replay, got none")):
+        replay("multi-quadrotor-3", log)
+    assert json.loads(run("log", log, "--robot", "multi-quadrotor-3", "--json").stdout)["uses"]["replay"] == missing

@@ -15,6 +15,7 @@ from towline.base.errors import InputError
 from towline.estimation.logs import read_log, read_measurements, recordings
 from towline.estimation.logs.mapping import fields_of
 from towline.estimation.logs.names import role
+from towline.estimation.logs.replay_needs import TO_COMPARE
 from towline.estimation.logs.tables import from_csv
 from towline.models import Dynamics, points
 
@@ -91,7 +92,7 @@ def test_gaps_are_listed(tmp_path):
         "calibration with poses": "poses (or give another file with --poses)",
         "calibration without poses": None,
         "pose from lengths": None,
-        "replay": None,
+        "replay": TO_COMPARE,
     }
 
 

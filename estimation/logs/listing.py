@@ -12,6 +12,7 @@ from ...models.robot import Robot
 from .mapping import Fields, LogMap, carrier_fields, command_fields, fields_of, free_axes
 from .names import UNITS, time_unit
 from .recording import GAP, Recording, Topic, plain
+from .replay_needs import missing_for_replay
 
 MOST_NAMED = 8  # fields of a topic
 ROLES = ("lengths", "position", "orientation", "tensions", "directions")
@@ -25,19 +26,21 @@ def listing(recordings: Sequence[Recording], given: LogMap | None = None, robot:
     """
     moving = [] if robot is None else [carrier.name for carrier in robot.carriers if carrier.moves]
     others: dict[str, list[str]] = {}
-    problem = None
+    problem, found, commands, placed = None, Fields(), Fields(), list[str]()
     try:
         found = fields_of(recordings, given, None if robot is None else robot.m, moving, free_axes(robot))
         for name in moving:
             of = carrier_fields(recordings, given, name)
             found = found._replace(directions=found.directions or of.directions)
+            placed += [name] if of.position else []
             others[name] = [one.label for one in (*of.position, *of.orientation, *of.thrusts, *of.directions)]
+        commands = command_fields(recordings, given, len(found.lengths) if robot is None else robot.m, moving)
         if given and given.thrusts and robot is not None:
-            others["thrusts"] = [one.label for one in command_fields(recordings, given, robot.m).thrusts]
+            others["thrusts"] = [one.label for one in commands.thrusts]
         if found.efforts and not found.tensions:
             others["tensions for replays"] = [one.label for one in found.efforts]
     except InputError as error:
-        found, problem = Fields(), f"{error}{', or give the robot (--robot)' if robot is None else ''}"
+        problem = f"{error}{', or give the robot (--robot)' if robot is None else ''}"
     return {
         "files": [
             {
@@ -49,7 +52,7 @@ def listing(recordings: Sequence[Recording], given: LogMap | None = None, robot:
             for one in recordings
         ],
         "fields": {name: [one.label for one in getattr(found, name)] for name in ROLES} | others,
-        "uses": _uses(found, robot is not None and robot.fixed_lengths is not None),
+        "uses": _uses(found, commands, robot, placed),
         "problem": problem,
     }
 
@@ -80,9 +83,9 @@ def _topic(topic: Topic, found: Fields) -> dict[str, Any]:
     }
 
 
-def _uses(found: Fields, fixed: bool) -> dict[str, str | None]:
+def _uses(found: Fields, commands: Fields, robot: Robot | None, placed: Sequence[str]) -> dict[str, str | None]:
     """Return what logs can be used for, and None, or what is missing."""
-    # Cables of fixed length have no readings.
+    fixed = robot is not None and robot.fixed_lengths is not None  # cables of fixed length have no readings
     first = found.lengths or ((found.position or found.directions) if fixed else ())
     timed = bool(first) and (first[0].topic.times is not None or any(one.topic is first[0].topic for one in found.time))
     no_lengths = None if first else "lengths"
@@ -91,7 +94,7 @@ def _uses(found: Fields, fixed: bool) -> dict[str, str | None]:
         "calibration with poses": no_lengths or (None if poses else "poses (or give another file with --poses)"),
         "calibration without poses": no_lengths,
         "pose from lengths": no_lengths,
-        "replay": no_lengths or (None if timed else "times"),
+        "replay": no_lengths or missing_for_replay(found, commands, timed, robot, placed),
     }
 
 

@@ -19,9 +19,10 @@ from .carrier_poses import carriers_at, filled
 from .encoders import lengths_of
 from .field import Field
 from .load_cells import unreadable
-from .mapping import command_fields, read_map
+from .mapping import carrier_fields, command_fields, read_map
 from .north_east_down import carriers_from_ned, ned_frame, note_of, platform_from_ned
 from .reading import Log, Paths, read_log
+from .replay_needs import missing_for_replay
 from .streams import Reader
 from .thrust_gains import notes as notes_of_gains
 from .thrust_gains import thrust_gains
@@ -79,15 +80,18 @@ def read_recorded(
     where = "; ".join(one.where for one in read.recordings)
     try:
         measured = read.measurements
-        if measured.times is None:
-            raise InputError("must have times for a replay, got none")
         if measured.m != known.m:
             raise InputError(f"must have a length for each of the {known.m} cables of {known.name}, got {measured.m}")
+        names = [carrier.name for carrier in known.carriers]
+        found = command_fields(read.recordings, given, known.m, names)
+        placed = [name for name in names if carrier_fields(read.recordings, given, name).position]
+        if missing := missing_for_replay(read.fields, found, measured.times is not None, known, placed):
+            raise InputError(f"must have {missing} for a replay, got none")
         if fix:
             read, correction = corrected_log(known, read)
             known, measured, columns = correction.robot, read.measurements, correction.columns
+        assert measured.times is not None
         times, notes = measured.times + read.begin, list(read.notes)
-        found = command_fields(read.recordings, given, known.m, [carrier.name for carrier in known.carriers])
         reader = Reader(found)
 
         def at(which: Sequence[Field], size: int) -> np.ndarray | None:
@@ -149,7 +153,6 @@ def _poses(robot: Robot, read: Log, notes: list[str]) -> tuple[np.ndarray, np.nd
     measured, moves = read.measurements, robot.dof_mask > 0
     poses = np.full((len(measured), 6), np.nan) if measured.poses is None else measured.poses.copy()
     known = np.asarray(np.isfinite(poses).any(axis=0))
-    poses[:, ~moves] = np.where(np.isfinite(poses[:, moves][:, :1]), robot.home[~moves], np.nan)
     if not known[moves].all():
         seen = measured.directions is not None
         if not seen and (any(carrier.moves for carrier in robot.carriers) or not read.fields.lengths):
@@ -159,4 +162,5 @@ def _poses(robot: Robot, read: Log, notes: list[str]) -> tuple[np.ndarray, np.nd
         means = "lengths and directions of the cables" if seen else "lengths"
         notes.append(f"coordinates of the pose that were not measured are computed from the {means}")
         known |= seen
+    poses[:, ~moves] = np.where(np.isfinite(poses[:, moves]).all(axis=1, keepdims=True), robot.home[~moves], np.nan)
     return poses, known & moves
