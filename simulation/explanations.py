@@ -21,10 +21,11 @@ RANGES = {
     "anchors": (-0.3, 0.3, 2e-4),
     "load_cells": (-0.9, 10.0, 0.01),
     "cable_friction": (-1e5, 1e5, 0.1),
+    "thrusts": (-0.9, 10.0, 0.01),
 }
 ALONE = ("delay", "friction", "mass", "stiffness")  # parameters of one number, which a fit may write
 STEPS, HALVINGS = 4, 3  # of Gauss and Newton, and of a step that is too long
-LEAST = 0.5, 0.1  # share that a parameter of several numbers, or of one, must explain to be named
+LEAST = 0.5, 0.1  # share that a parameter of several numbers, or of one by measured poses, must explain to be named
 REMOVED = 0.01  # of the sum of squares, from which on a parameter is named
 NOTHING = 0.5  # of the sum of squares that noise has: less needs no explanation
 DOUBT = 5e-4  # probability, on each side, that a parameter is named which only the scatter of the windows changes
@@ -200,7 +201,8 @@ class Matching:
                 noise = np.sum(self._echoed[used] ** 2)
                 shown = shown and noise <= BLURRED * np.sum(self.slope(first, name)[:, used] ** 2)
             explained = float(removed / max(whole - count, removed, 1e-12))
-            least = LEAST[int(name in ALONE)]
+            # Poses that are computed have errors of lengths and directions, of which each parameter explains some.
+            least = LEAST[int(name in ALONE and not self.windows.recorded.computed)]
             named = shown and bool(certainly.any()) and explained > least and removed > REMOVED * whole
             named = bool(named and whole > NOTHING * count)
             old, new, sigma = (_plain(one) for one in (before, value, sigma))
@@ -215,6 +217,7 @@ def applicable(windows: Windows) -> Sequence[str]:
     names = {"delay": windows.commanded, "friction": felt, "mass": True, "stiffness": windows.drive != "tensions"}
     names |= {"tilt": True, "com": bool(recorded.robot.dof_mask[3:].any()), "load_cells": recorded.tensions is not None}
     names |= {"cable_friction": felt, "anchors": recorded.robot.fixed_lengths is None}
+    names["thrusts"] = len(windows.flown) > 0
     return [name for name, depends in names.items() if depends]
 
 

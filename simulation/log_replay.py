@@ -218,7 +218,7 @@ class Replay(Drawn, Reported, Displayed):
             return f"{text}; {self.windows.recorded.doubt}"
         if self.named:
             best = self.found[0]
-            verb = "explain" if best.name in ("load_cells", "anchors") else "explains"
+            verb = "explain" if best.name in ("load_cells", "anchors", "thrusts") else "explains"
             first, *others = map(_words, self.named)
             causes = " or ".join([f"{first} ({_value(best.name, best.value)})", *others])
             text += f"; {causes} {verb} {_share(best)} of the residuals"
@@ -377,6 +377,10 @@ def _value(name: str, value: Any) -> str:
         worst = int(np.argmax(np.abs(gains) + np.abs(zeros)))
         rest = f"{'plus' if zeros[worst] >= 0 else 'minus'} {100 * abs(zeros[worst]):.2g} % of the median tension"
         return f"that of cables[{worst}] reads {1 + gains[worst]:.3g} times the tension {rest}"
+    if name == "thrusts":
+        each = np.atleast_1d(value)
+        worst = int(np.argmax(np.abs(each)))
+        return f"that of carriers[{worst}] is recorded as {1 + each[worst]:.3g} times the thrust"
     if name in FACTORS:
         return f"{value:.4g} times the file's"
     return quantity(1e3 * value, "ms", 3) if name == "delay" else quantity(value, "N", 3)

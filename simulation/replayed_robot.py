@@ -25,6 +25,7 @@ class Parameters(NamedTuple):
     load_cells: tuple[float, ...] = ()
     cable_friction: tuple[float, ...] = ()  # dry friction of each cable beyond `friction`, (m,) [N]
     anchors: tuple[float, ...] = ()  # anchors less the file's, (3 m,) [m]
+    thrusts: tuple[float, ...] = ()  # recorded thrusts over those of the carriers, minus 1, (c,)
 
 
 def modelled(robot: Robot, drive: str, flown: np.ndarray) -> Robot:

@@ -13,6 +13,7 @@ from ..base.errors import InputError
 from ..estimation.logs.pose_track import PoseTrack, track_of
 from ..estimation.logs.recorded import Recorded
 from ..estimation.logs.recording import GAP
+from ..estimation.logs.replay_needs import TO_COMPARE
 from ..estimation.logs.smoothing import noise_of, smooth, widest_parabola
 from ..models import points
 from ..models.dynamics import dynamics_of
@@ -39,6 +40,7 @@ class Windows:
     - `drive`: what is commanded: "lengths", "tensions", or "forces" of winches' motors; default: commands where these
       are recorded, otherwise measured lengths of cables with a stiffness, otherwise measured tensions or lengths.
     - `window`: duration of a window [s].
+    - `flown`: numbers of the carriers whose recorded thrusts drive them.
     - `starts`: times at which windows start [s], (W,).
     - `rows`, `inside`: samples of each window, (W, S), and which of these belong to it; the last of a shorter window is
       repeated.
@@ -52,10 +54,10 @@ class Windows:
     def __init__(self, recorded: Recorded, drive: str | None, window: float):
         robot, self.recorded, self.window, times = recorded.robot, recorded, window, recorded.times
         self.notes = list(recorded.notes)
-        self._flown = np.flatnonzero(np.isfinite(recorded.thrusts).all(axis=0))
+        self.flown = np.flatnonzero(np.isfinite(recorded.thrusts).all(axis=0))
         self._choose(drive)
-        self.commanded = robot.fixed_lengths is None or len(self._flown) > 0
-        self.robot = modelled(robot, self.drive, np.isin(np.arange(len(robot.carriers)), self._flown))
+        self.commanded = robot.fixed_lengths is None or len(self.flown) > 0
+        self.robot = modelled(robot, self.drive, np.isin(np.arange(len(robot.carriers)), self.flown))
         self.assumed = any(cable.stiffness is None for cable in robot.cables)
         if self.assumed and self.drive != "tensions":
             self.notes.append("cables without a stiffness in the file are given one: 0.1 % of elongation at t_max")
@@ -63,6 +65,7 @@ class Windows:
             self.notes.append("lengths do not show friction of the winches: record tensions or motor currents for that")
         none = robot.m * (0.0,)  # parameters of the file
         usual = {"load_cells": 2 * none, "cable_friction": none, "anchors": 3 * none}
+        usual["thrusts"] = len(robot.carriers) * (0.0,)
         self.usual = Parameters(friction=friction_of(self.robot), **usual)
         self.usual_tension = self.robot.force_scale
         if recorded.tensions is not None:
@@ -83,7 +86,7 @@ class Windows:
         self._moves = np.flatnonzero(robot.dof_mask)
         slope = SLOPE / (neighbours**1.5 * apart)
         of_pose = [self._of_pose[int(i >= 3)] for i in self._moves]
-        of_flown = [self._of_pose[0]] * 3 * len(self._flown)
+        of_flown = [self._of_pose[0]] * 3 * len(self.flown)
         sigma = [*of_pose, *(slope * one for one in of_pose), *of_flown, *(slope * one for one in of_flown)]
         self.start_sigma, self.start = np.array(sigma), np.zeros((len(self.starts), len(sigma)))
         pairs = (len(of_pose), len(of_pose), len(of_flown), len(of_flown))
@@ -162,9 +165,7 @@ class Windows:
         left_out |= set() if of.measured[3:].any() else {"rotation"}
         noise = {name: value for name, value in noise.items() if name not in left_out}
         if not noise:
-            raise InputError(
-                "log must have poses, or tensions or lengths that do not drive the plant, to compare, got none"
-            )
+            raise InputError(f"log must have {TO_COMPARE}, to compare, got none")
         return noise
 
     def shaken(self) -> Windows:
@@ -207,7 +208,7 @@ class Windows:
         for index, track in self._carriers.items():
             carriers[:, :, index] = self._along(track)
         self._platform, self._carried = self._motion(self._along(self._track)), self._motion(carriers)
-        self._attitudes = {index: self._attitude(carriers[:, :, index, 3:]) for index in self._flown}
+        self._attitudes = {index: self._attitude(carriers[:, :, index, 3:]) for index in self.flown}
         values, of_cables = self._command, tuple(zip(self._command.T, self._lags, strict=True))
         self._signal: Any = lambda at: np.stack([np.interp(at - lag, of.times, one) for one, lag in of_cables], axis=-1)
         if self.drive == "lengths" and self.measured_command and len(of.times) >= FEWEST:
@@ -274,7 +275,7 @@ class Windows:
             part[..., self._moves] += more
         parts[1][..., self.recorded.robot.dof_mask == 0] = 0.0
         for part, more in zip(parts[2:], by[2:], strict=True):
-            part[..., self._flown, :3] += more.reshape(*more.shape[:2], -1, 3)
+            part[..., self.flown, :3] += more.reshape(*more.shape[:2], -1, 3)
         pose, velocity, carrier_pose, carrier_velocity = parts
         given: dict[str, Any] = {"lengths": np.ones(m)} if free else {"tensions": pulls}
         states = plant.start(pose, velocity, carrier_pose, carrier_velocity, **given).reshape(-1, plant.size)
@@ -346,8 +347,9 @@ class Windows:
             cables = np.broadcast_to(pulls, (len(own), *pulls.shape))
         actuators = max(len(carrier.actuators) for carrier in self.robot.carriers)
         actuation = np.zeros((*self._grid.shape, len(self.robot.carriers), actuators))
-        for index in self._flown:
-            actuation[:, :, index, 0] = np.interp(middle, self.recorded.times, self.recorded.thrusts[:, index])
+        for index in self.flown:
+            thrust = np.interp(middle, self.recorded.times, self.recorded.thrusts[:, index])
+            actuation[:, :, index, 0] = thrust / (1 + np.atleast_1d(with_.thrusts)[index])
         return plant.command(np.ones(self.robot.m), actuation, *self._carried), cables
 
     def _residuals(

@@ -248,6 +248,15 @@ def test_what_is_wrong_is_named_first(kind, name, robot, options, truth, logs):
     assert re.search(rf"; {name} \(.*\) explains", result.report().splitlines()[0])
 
 
+def test_a_thrust_that_is_recorded_too_low_is_no_mass(tmp_path):
+    found = columns("thrusts", every("thrusts"))
+    found["quad2_thrust [N]"] = 0.93 * found["quad2_thrust [N]"]
+    result = replay("multi-quadrotor-3", written(tmp_path / "log.csv", found))
+    assert result.named[0] == "thrusts"
+    np.testing.assert_allclose(result.found[0].value, [0, -0.07, 0], atol=0.01)
+    assert re.search(r"thrusts \(that of carriers\[1\] .* 0\.9\d+ times the thrust\) explain ", result.report())
+
+
 def test_wrong_anchors_are_named(logs):
     moved = np.array([[0.0, 0, 0.03], [0, 0, 0], [-0.03, 0, 0], [0, 0, 0]])
     cables = [

@@ -48,6 +48,8 @@ class Recorded(Displayed):
     thrusts: np.ndarray  # thrust of each carrier, (N, c) [N], nan where not recorded
     notes: Sequence[str]  # remarks, one line each
     doubt: str | None = None  # probable input error of the log, in one line, or None
+    # True if poses to compare with are computed from lengths and directions of cables, whose errors they include
+    computed: bool = False
 
 
 def read_recorded(
@@ -116,7 +118,7 @@ def read_recorded(
         if tensions is not None and lengths is not None and unreadable(tensions, measured.lengths).any():
             tensions = None
             notes.append("tensions are left out of the replay, because some were not measured")
-        pose, known_part = _poses(known, read, notes)
+        pose, known_part, computed = _poses(known, read, notes)
         checked = lengths is not None and not any(carrier.moves for carrier in known.carriers)
         wrong = mistake(known, measured) if checked else None
         carrier_pose, thrusts = carriers_at(known, read.recordings, given, times, len(times), notes)
@@ -142,17 +144,21 @@ def read_recorded(
             thrusts=thrusts,
             notes=notes,
             doubt=doubt,
+            computed=computed,
         )
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(where) else f"{where}: {text}") from None
 
 
-def _poses(robot: Robot, read: Log, notes: list[str]) -> tuple[np.ndarray, np.ndarray]:
-    """Return poses (N, 6), and which of their coordinates were measured; locked ones are at home."""
+def _poses(robot: Robot, read: Log, notes: list[str]) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Return poses (N, 6), which of their coordinates are known, (6,), and whether directions of cables gave some.
+
+    Locked coordinates are at home.
+    """
     measured, moves = read.measurements, robot.dof_mask > 0
     poses = np.full((len(measured), 6), np.nan) if measured.poses is None else measured.poses.copy()
-    known = np.asarray(np.isfinite(poses).any(axis=0))
+    known, seen = np.asarray(np.isfinite(poses).any(axis=0)), False
     if not known[moves].all():
         seen = measured.directions is not None
         if not seen and (any(carrier.moves for carrier in robot.carriers) or not read.fields.lengths):
@@ -163,4 +169,4 @@ def _poses(robot: Robot, read: Log, notes: list[str]) -> tuple[np.ndarray, np.nd
         notes.append(f"coordinates of the pose that were not measured are computed from the {means}")
         known |= seen
     poses[:, ~moves] = np.where(np.isfinite(poses[:, moves]).all(axis=1, keepdims=True), robot.home[~moves], np.nan)
-    return poses, known & moves
+    return poses, known & moves, seen
