@@ -104,6 +104,7 @@ class Planner(Displayed):
         self._share = scenario.task.robust
         # The first plan counts the robot as exact.
         self.scenario = replace(scenario, task=scenario.task.model_copy(update={"robust": None}))
+        self._given = self.scenario.task
         self._solvers: dict[Mesh, Solver] = {}
         self._search: Search | None = None  # that has not ended
         self._last: tuple[Mesh, Deviation] | None = None  # of the last feasible plan
@@ -145,7 +146,8 @@ class Planner(Displayed):
             if plan.feasible and plan.deviation is not None and search.mesh is not None:
                 self._last = search.mesh, plan.deviation
             if self._share is not None:
-                plan = for_robots(plan, self._share, partial(self._plan_again, search))
+                task = plan.scenario.task if self._chosen is None else self._given  # with its ranges of durations
+                plan = for_robots(plan, task, self._share, partial(self._plan_again, search))
             if (within := self.scenario.task.stop_within) is not None:
                 again = partial(self._plan_again, search, timing=search.timing)
                 plan = stopping_within(plan, self.scenario, within, again)
@@ -157,8 +159,11 @@ class Planner(Displayed):
         self, first: Search, scenario: Scenario, start: Deviation | None, timing: PathTiming | None = None
     ) -> Plan:
         """Plan another scenario in the remaining time of the first search; `timing` is that of the same path."""
+        scenario, chosen = shortest_durations(scenario)
         self._search = search = Search(scenario, {}, first.progress, first.seconds_left, timing=timing)
-        return replace(climb(search, start, None), stages=tuple(search.stages))
+        search.stages += [chosen.stage] if chosen else []
+        plan = replace(climb(search, start, None), stages=tuple(search.stages))
+        return plan if chosen is None else chosen.judged(plan)
 
     def replan(
         self,

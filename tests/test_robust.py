@@ -216,6 +216,26 @@ def test_a_plan_that_is_infeasible_for_the_file_too_has_offers_for_robots():
     assert offer.plan.share_of_robots(count=40, seed=7).share >= 0.95
 
 
+LEGS = [[-2, 0.5, 1.5, 0, 0, 0], [2, 0.5, 1.5, 0, 0, 0]]
+DWELLS = {"path": {"kind": "waypoints", "points": LEGS, "dwell": 0.1}}
+PHASES = {
+    "phases": [
+        {"name": "over", "path": {"kind": "line", "start": LEGS[0], "end": LEGS[1]}, "duration": {"min": 0.5, "max": 4}}
+    ]
+}
+
+
+@pytest.mark.parametrize("task", [DWELLS | {"duration": {"min": 0.5, "max": 4}, "objective": {"time": 1}}, PHASES])
+def test_the_shortest_duration_is_that_of_the_share(task):
+    """The shortest motion of the exact robot reaches the limits, so that others need a longer one."""
+    robot = known("cogiro", 0.02, t_max=500.0)
+    exact, found = plan(robot, task), plan(robot, task, robust=0.95)
+    assert exact.feasible
+    assert found.feasible, found.reason
+    assert exact.duration < found.duration < 4
+    assert found.share_of_robots(count=40, seed=7).share >= 0.95
+
+
 def test_robots_that_weigh_little_keep_their_limits_too():
     """The same robot with a millionth of all forces has the same answer."""
     data = known("wang-flying", 0.01).model_dump()

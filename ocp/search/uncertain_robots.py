@@ -41,12 +41,16 @@ Climb = Callable[[Scenario, Deviation | None], Plan]
 """Plans a scenario from a start."""
 
 
-def for_robots(first: Plan, share: float, climb: Climb) -> Plan:
-    """Return the plan for a share of the robots, from the `first` one, which counts the robot of the file as exact."""
-    robot, task = first.scenario.robot, first.scenario.task
+def for_robots(first: Plan, task: Task, share: float, climb: Climb) -> Plan:
+    """Return the plan of a task for a share of the robots.
+
+    The `first` plan counts the robot of the file as exact; where the planner chose its durations, tightened limits need
+    others.
+    """
+    robot = first.scenario.robot
     plan, stages = judged(first, robot, share), list(first.stages)
     if not first.feasible:
-        return replace(plan, offers=partial(_for_others, first, share, climb))
+        return replace(plan, offers=partial(_for_others, first, task, share, climb))
     spent = np.array([first.build_s, first.solve_s])
     tightened, reason, tried = np.zeros(robot.m), "", [first]
     for _ in range(ROUNDS):
@@ -72,17 +76,16 @@ def for_robots(first: Plan, share: float, climb: Climb) -> Plan:
     plan = replace(plan, stages=tuple(stages), build_s=float(spent[0]), solve_s=float(spent[1]))
     if plan.robust is None or plan.robust.holds:
         return plan
-    return replace(plan, reason=reason, offers=partial(_near, robot, share, climb, tried, tightened))
+    return replace(plan, reason=reason, offers=partial(_near, robot, task, share, climb, tried, tightened))
 
 
-def _near(robot: Robot, share: float, climb: Climb, tried: list[Plan], tightened: np.ndarray) -> Offers:
+def _near(robot: Robot, task: Task, share: float, climb: Climb, tried: list[Plan], tightened: np.ndarray) -> Offers:
     """Return what makes a task feasible for the robots: what tightened limits need, fewer robots, or smaller errors.
 
     The latter two are those that one of the `tried` plans allows, or one for limits that are tightened by a part of
     (m,) [N].
     """
-    task, last = tried[0].scenario.task, tried[-1]
-    made = Offers() if last.feasible else _that_hold(last, robot, share)
+    made = Offers() if tried[-1].feasible else _that_hold(tried[-1], robot, share)
     found = [*made.found]
     plans, low, high = [plan for plan in tried if plan.feasible], 0.0, 1.0
     for _ in range(HALVINGS):
@@ -117,9 +120,9 @@ def _most(
     return best
 
 
-def _for_others(first: Plan, share: float, climb: Climb) -> Offers:
+def _for_others(first: Plan, task: Task, share: float, climb: Climb) -> Offers:
     """Return what makes a task feasible for the robots that is not even so for the robot of the file."""
-    robot, task = first.scenario.robot, first.scenario.task
+    robot = first.scenario.robot
     held = _that_hold(first, robot, share)
     plans = (judged(offer.plan, offer.plan.scenario.robot, share) for offer in first.relaxations)
     spread = next((GROWTH * plan.robust.reach.max(axis=0) for plan in plans if plan.robust is not None), None)
