@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+NEARLY_SYMMETRIC = 1e-6  # sine of the angle of a rotation
+
 
 def rotations(angles: np.ndarray) -> np.ndarray:
     """Return R = Rz(yaw) Ry(pitch) Rx(roll) of angles (..., 3) [rad], (..., 3, 3) [-]."""
@@ -33,6 +35,19 @@ def axial(matrices: np.ndarray) -> np.ndarray:
     """Return the vectors (..., 3) of the skew-symmetric parts of matrices (..., 3, 3)."""
     skew = (matrices - matrices.swapaxes(-1, -2)) / 2
     return np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
+
+
+def rotation_vectors(R: np.ndarray) -> np.ndarray:
+    """Return the rotation vectors (N, 3) [rad] of rotations (N, 3, 3)."""
+    sines, cosines = axial(R), (np.trace(R, axis1=1, axis2=2) - 1) / 2
+    sizes = np.linalg.norm(sines, axis=1)
+    turned = np.arctan2(sizes, cosines)
+    result = sines * np.divide(turned, sizes, out=np.ones_like(sizes), where=sizes > 0)[:, None]
+    for k in np.flatnonzero((sizes < NEARLY_SYMMETRIC) & (cosines < 0)):  # half turns, which hide the axis there
+        products = (R[k] + R[k].T) / 2 - cosines[k] * np.eye(3)  # of the axis with itself, times 1 - cosine
+        axis = products[np.argmax(np.diag(products))]
+        result[k] = turned[k] * axis / np.linalg.norm(axis) * (-1.0 if axis @ sines[k] < 0 else 1.0)
+    return result
 
 
 def skew(vectors: np.ndarray) -> np.ndarray:

@@ -44,6 +44,17 @@ def matrices(angles):
     return Rotation.from_euler("xyz", angles).as_matrix()
 
 
+def test_rotation_vectors_are_those_of_scipy_up_to_half_a_turn():
+    draw = np.random.default_rng(0)
+    axes = draw.normal(size=(300, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    turns = np.resize([0.0, 1e-9, 0.3, 2.0, np.pi - 1e-4, np.pi - 1e-7, np.pi - 1e-9], 300)
+    R = Rotation.from_rotvec(axes * turns[:, None]).as_matrix()
+    found = points.rotation_vectors(R)
+    np.testing.assert_allclose(found, Rotation.from_matrix(R).as_rotvec(), atol=1e-10)
+    np.testing.assert_allclose(points.rotation_vectors(np.diag([1.0, -1.0, -1.0])[None]), [[np.pi, 0.0, 0.0]])
+
+
 def angular_motion(angles, rates, accelerations):
     """Return angular velocity and acceleration in {G}: turns about z, the turned y and the twice turned x."""
     R = np.tile(np.eye(3), (len(angles), 1, 1))

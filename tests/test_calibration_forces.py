@@ -12,9 +12,12 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from towline.base.errors import InputError
-from towline.estimation.calibration import Measurements, calibrate, stretch
+from towline.estimation.calibration import Measurements, calibrate, solving, stretch
+from towline.estimation.calibration.autocorrelation import information_of
 from towline.estimation.calibration.balance import FeltTensions
 from towline.estimation.calibration.model import Model
+from towline.estimation.calibration.normal_equations import NormalEquations
+from towline.estimation.calibration.outliers import find_outliers
 from towline.estimation.calibration.parameters import COMMON, FRAMES, GROUPS, OF_CABLE, Parameters
 from towline.estimation.calibration.solving import solve
 from towline.estimation.calibration.stretch import with_elasticity, with_stretch
@@ -395,6 +398,20 @@ def test_blocks_of_a_long_log_show_stretch_as_all_samples_do(monkeypatch):
     groups, sigmas = with_elasticity(solved)
     assert "attachments" in groups
     assert 0 < sigmas["attachments"] <= 5e-3
+
+
+def test_nothing_is_computed_twice_of_a_long_log(monkeypatch):
+    """The noise of a fit tells whether cables stretch, and is reported; wrong readings need no normal equations."""
+    computed = []
+    monkeypatch.setattr(solving, "information_of", lambda *given: computed.append(given) or information_of(*given))
+    _, robot, log = hanging(1, 0.0)
+    found = calibrate(robot, log.only(slice(200)).changed(sigma={"lengths": 3e-4, "position": 3e-4}))
+    assert found.autocorrelation >= 1
+    assert len(computed) == 1
+    solved = found._solved
+    assert solved.model.poses_vary.any()
+    monkeypatch.setattr(NormalEquations, "at", None)
+    assert find_outliers(solved.model, solved.fit.state)[0] == []
 
 
 def test_wrong_requests_are_one_line():

@@ -20,18 +20,7 @@ from .geometry import length_of
 from .hanging import carrying
 from .model import Model, State
 from .parameters import IN_BALANCE, Parameters
-from .solving import (
-    Solved,
-    check_enough,
-    cleaned,
-    covariance_of,
-    is_enough,
-    lengths_of,
-    model_of,
-    noise_of,
-    solve,
-    usual,
-)
+from .solving import Solved, check_enough, cleaned, covariance_of, is_enough, lengths_of, model_of, solve, usual
 from .starts import fit_from
 from .turning import turning
 from .zeros import from_thrusts
@@ -184,7 +173,7 @@ def _clock_sigma(solved: Solved) -> float:
     """Return the standard deviation of the clock offset [s]."""
     of = solved.model.parameters
     at = int(np.flatnonzero(np.flatnonzero(of.varies) == of.clock)[0])
-    variance = covariance_of(solved, noise_of(solved))[at, at]
+    variance = covariance_of(solved)[at, at]
     return float(np.sqrt(variance)) if solved.observability.determined[at] else np.inf
 
 
@@ -274,4 +263,4 @@ def _mean_square(model: Model, state: State) -> float:
 def poses_fitted(model: Model) -> tuple[Model, State]:
     """Return the model without free parameters, and the poses that fit the lengths best with the robot's file."""
     nothing = replace(model, parameters=Parameters(model.robot, ()), prior={}, kept=None)
-    return nothing, fit_from(nothing, nothing.begin(), length_of(model.robot))[0].state
+    return nothing, fit_from(nothing, nothing.begin(), length_of(model.robot), enough=ENOUGH)[0].state

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import chdtr, chdtri
 
 from .parameters import Parameters
-from .solving import LOOSE, LOOSE_SHARE, Solved, covariance_of, noise_of
+from .solving import LOOSE, LOOSE_SHARE, Solved, covariance_of
 
 ENDS = {"frame": "anchors", "body": "attachments"}  # what an unknown frame moves together with
 DETERMINED = 0.1  # of the variance of the first prior
@@ -29,7 +29,7 @@ def loose(length: float, groups: tuple[str, ...], prior: Mapping[str, float]) ->
 def errors_of_file(solved: Solved, prior: Mapping[str, float]) -> dict[str, float]:
     """Return standard deviations with those of the file's errors, from a fit with `loose` ones in place of them."""
     of, result = solved.model.parameters, dict(solved.model.prior)
-    covariance, change = covariance_of(solved, noise_of(solved)), (solved.fit.state.x - of.first)[of.varies]
+    covariance, change = covariance_of(solved), (solved.fit.state.x - of.first)[of.varies]
     for name in set(solved.model.prior) - set(prior):
         own = np.isin(np.flatnonzero(of.varies), np.flatnonzero(Parameters(of.robot, (name,)).varies))
         variances, axes = np.linalg.eigh(covariance[np.ix_(own, own)])

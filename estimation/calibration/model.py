@@ -318,7 +318,7 @@ class Model(Displayed):
         poses = np.zeros(sigmas.shape)
         held = (sigmas > 0) & np.isfinite(sigmas)
         if held.any():
-            turned = Rotation.from_matrix(state.turn).as_rotvec()
+            turned = points.rotation_vectors(state.turn)
             moved = np.concatenate([state.shift, turned, state.errors], axis=1)
             poses[held] = moved[held] / sigmas[held]
         forces = None

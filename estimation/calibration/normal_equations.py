@@ -139,7 +139,7 @@ def _of_part(model: Model, state: State, scale: np.ndarray, damping: np.ndarray 
         S, b = S + inner(flat, flat), b + inner(flat, forces.residuals.reshape(-1, 1))[:, 0]
     if not model.poses_vary.any():
         return _Part(S, b, cost)
-    inverse_root, g, of_poses = _poses(model, residuals, derivatives, damping)
+    inverse_root, g, of_poses = pose_equations(model, residuals, derivatives, damping)
     E = layers[0].cross(model.poses_vary)
     for layer in layers[1:]:
         E[:, :6] += layer.cross(model.poses_vary)
@@ -224,8 +224,8 @@ def _layers(
     return layers, keep
 
 
-def _poses(
-    model: Model, residuals: Residuals, derivatives: Derivatives, damping: np.ndarray | None
+def pose_equations(
+    model: Model, residuals: Residuals, derivatives: Derivatives, damping: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return L_k^-1 (N, 6, 6), G_k'e (N, 6) and C_k's diagonal (N, 6) of the coordinates that vary."""
     vary, sigmas = model.poses_vary, model.pose_sigmas
@@ -268,7 +268,7 @@ def pose_steps(model: Model, state: State) -> tuple[np.ndarray, np.ndarray, np.n
 
 def _steps(model: Model, residuals: Residuals, derivatives: Derivatives) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     vary = model.poses_vary
-    inverse_root, g, _ = _poses(model, residuals, derivatives, None)
+    inverse_root, g, _ = pose_equations(model, residuals, derivatives)
     bent = curvature(residuals, derivatives) * (vary[:, :, None] & vary[:, None, :])
     values, vectors = np.linalg.eigh(inverse_root @ bent @ np.swapaxes(inverse_root, 1, 2))
     inverse_root = (
@@ -284,7 +284,7 @@ def pose_covariances(model: Model, state: State) -> np.ndarray:
 
     They are infinite where nothing determines a coordinate, and zero where it cannot move.
     """
-    roots = [_poses(part, *part.linearised(own), None)[0] for _, part, own in model.parts(state)]
+    roots = [pose_equations(part, *part.linearised(own))[0] for _, part, own in model.parts(state)]
     _, values, V = np.linalg.svd((np.concatenate(roots) * model.poses_vary[:, None])[..., :6])
     open_ = values[..., None] ** 2 > LARGEST_VARIANCE
     root = np.where(open_, 0.0, values[..., None] * V)

@@ -17,7 +17,7 @@ from ..pose.estimate import largest_cost
 from ..pose.wrong_lengths import TOLD_APART
 from .fit import fit, held
 from .model import Model, State
-from .normal_equations import NormalEquations, metric
+from .normal_equations import NormalEquations, metric, pose_equations
 from .parameters import Parameters
 from .products import quadratic_forms
 from .projection import Projected, parts, project
@@ -102,15 +102,16 @@ def find_unbalanced(model: Model, state: State) -> tuple[float, np.ndarray] | No
     forces = model.balanced
     if forces is None:
         return None
-    equations = NormalEquations.at(model, state, metric(model))
     spare, squares = forces.equations.astype(float), np.zeros(len(state.shift))
     for rows, part, own in model.parts(state):
-        balance = part.linearised(own)[1].balance
+        residuals, derivatives = part.linearised(own)
+        balance = derivatives.balance
         assert balance is not None
         squares[rows] = (balance.residuals**2).sum(axis=1)
-        if equations.inverse_root is not None and balance.by_pose is not None:
+        if model.poses_vary.any() and balance.by_pose is not None:
             K = balance.by_pose * part.poses_vary[:, None]
-            spare[rows] -= ((K @ np.swapaxes(equations.inverse_root[rows], 1, 2)) ** 2).sum(axis=(1, 2))
+            inverse_root, _, _ = pose_equations(part, residuals, derivatives)
+            spare[rows] -= ((K @ np.swapaxes(inverse_root, 1, 2)) ** 2).sum(axis=(1, 2))
     tested = model.inside(state) & (spare > SMALLEST_REDUNDANCY)
     if not tested.any():
         return None
@@ -282,7 +283,7 @@ def find_slips(model: Model, state: State, length: float) -> list[Slip]:
     spread = 1.4826 * float(np.median(np.abs(found.residuals[seen] / np.sqrt(found.redundancy[seen]))))
     limit = _threshold(m * count) * max(1.0, spread)
     candidates: list[tuple[float, int, int, float, float]] = []
-    for i, absorbed in enumerate(_absorbed(model, state, found.equations, length)):
+    for i, absorbed in enumerate(_absorbed(model, state, length)):
         total = np.cumsum(found.redundancy[i, ::-1])[::-1]
         information = np.maximum(total - absorbed, 1e-9 * max(float(total[0]), 1e-9))
         sums = np.cumsum(found.residuals[i, ::-1])[::-1]
@@ -306,12 +307,12 @@ def find_slips(model: Model, state: State, length: float) -> list[Slip]:
     return slips
 
 
-def _absorbed(model: Model, state: State, equations: NormalEquations | None, length: float) -> np.ndarray:
+def _absorbed(model: Model, state: State, length: float) -> np.ndarray:
     """Return the part of a step of each cable's residuals, from each sample on, that parameters absorb, (m, N)."""
-    whole = equations or NormalEquations.at(model, state, metric(model))
+    whole = NormalEquations.at(model, state, metric(model))
     inverse = np.linalg.inv(held(whole.S, length))
     sums, result = np.zeros((model.robot.m, len(inverse))), np.empty(model.weights.shape)
-    for part in parts(model, state, equations, backwards=True):
+    for part in parts(model, state, whole, backwards=True):
         for i, total in enumerate(sums):
             rows, columns = part.without_poses(i)
             rows[-1] += total[columns]

@@ -6,16 +6,15 @@ from typing import NamedTuple
 import numpy as np
 
 from .model import Derivatives, Model, State
-from .normal_equations import NormalEquations, metric
+from .normal_equations import NormalEquations, metric, pose_equations
 from .parameters import OF_CABLE, normal_rows
 
 
 class Projected(NamedTuple):
-    """Residuals of the readings and their redundancies, (m, N), and the normal equations, None if no pose varies."""
+    """Residuals of the readings and their redundancies, (m, N)."""
 
     residuals: np.ndarray
     redundancy: np.ndarray
-    equations: NormalEquations | None
 
 
 class Part(NamedTuple):
@@ -75,16 +74,17 @@ def parts(model: Model, state: State, equations: NormalEquations | None, backwar
 def project(model: Model, state: State) -> Projected:
     """Return residuals, and the share of each that stays where poses adapt to the readings."""
     used = (model.weights & model.inside(state)).astype(float)
-    equations = equations_of(model, state)
-    if equations is None:
-        return Projected(model.residuals(state).readings, used, None)
+    if not model.poses_vary.any():
+        return Projected(model.residuals(state).readings, used)
     residuals = np.empty(model.weights.shape)
-    for part in parts(model, state, equations):
-        residuals[:, part.rows] = part.residuals
-        for i in range(model.robot.m):
-            root = part.root(i)
-            used[i, part.rows] -= np.einsum("na,na->n", root, root)
-    return Projected(residuals, used, equations)
+    for rows, part, own in model.parts(state):
+        found, derivatives = part.linearised(own)
+        inverse_root, _, _ = pose_equations(part, found, derivatives)
+        residuals[:, rows] = found.readings
+        for i, by_pose in enumerate(derivatives.poses):
+            root = np.einsum("nab,nb->na", inverse_root, by_pose * part.poses_vary)
+            used[i, rows] -= np.einsum("na,na->n", root, root)
+    return Projected(residuals, used)
 
 
 def out_of_plane(model: Model, state: State, root: np.ndarray) -> np.ndarray:

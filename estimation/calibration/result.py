@@ -23,7 +23,7 @@ from .load_changes import load_changes
 from .outliers import Outlier, Slip
 from .parameters import OF_ROBOT
 from .plausibility import Mistake
-from .solving import Noise, Solved, covariance_of, inflation_of, is_still, lengths_of, noise_of
+from .solving import Noise, Solved, covariance_of, inflation_of, is_still, lengths_of
 
 EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
 FAR = 5.0  # standard deviations of the prior
@@ -208,7 +208,7 @@ class CalibrationData(Displayed):
         It is zero along unobservable directions. It is scaled up if residuals are larger than stated or autocorrelated
         (`noise`, `autocorrelation`).
         """
-        return covariance_of(self._solved, self._noise)
+        return covariance_of(self._solved)
 
     @cached_property
     def information(self) -> np.ndarray:
@@ -218,9 +218,9 @@ class CalibrationData(Displayed):
         """
         return self._noise.information
 
-    @cached_property
+    @property
     def _noise(self) -> Noise:
-        return noise_of(self._solved)
+        return self._solved.noise
 
     @property
     def noise(self) -> float:

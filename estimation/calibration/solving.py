@@ -1,10 +1,12 @@
 """`solve`: fit the parameters of a robot to measurements, excluding outliers and modelling slips of winches."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
+from ...base.display import Displayed
 from ...base.errors import InputError
 from ...base.text import counted
 from ...models.robot import Robot
@@ -44,22 +46,6 @@ NEGLIGIBLE = 0.02  # of the lengths' noise, by which tensions that change move l
 NOISE_OF_FORCES = 0.05, 1e4  # factors of the stated errors of forces
 
 
-class Solved(NamedTuple):
-    """A fit, with outliers, slips, observability, and clocks of carriers unless these are known."""
-
-    model: Model
-    fit: Fit
-    outliers: tuple[Outlier, ...]
-    slips: tuple[Slip, ...]
-    observability: Observability
-    clocks: CarrierClocks | None = None
-
-    @property
-    def parameters(self) -> np.ndarray:
-        """Return the values of all parameters but slips."""
-        return self.fit.state.x[: self.model.parameters.clock + OF_ROBOT]
-
-
 class Noise(NamedTuple):
     """The noise of a fit, and what it makes of the parameters.
 
@@ -75,6 +61,54 @@ class Noise(NamedTuple):
     redundancy: float
     covariance: np.ndarray
     information: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Solved(Displayed):
+    """A fit, with outliers, slips, observability, and clocks of carriers unless these are known."""
+
+    model: Model
+    fit: Fit
+    outliers: tuple[Outlier, ...]
+    slips: tuple[Slip, ...]
+    observability: Observability
+    clocks: CarrierClocks | None = None
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """Return the values of all parameters but slips."""
+        return self.fit.state.x[: self.model.parameters.clock + OF_ROBOT]
+
+    @cached_property
+    def noise(self) -> Noise:
+        """Return the noise of the fit.
+
+        Errors e of the readings with the covariance W and exact priors D give the parameters, of normal matrix
+        H = J'J + D, the covariance H^-1 (J'W J + D) H^-1. Where unknown poses have noise, the observability widens it.
+        """
+        model, state, seen = self.model, self.fit.state, self.observability
+        inside = model.inside(state)
+        spare = (model.weights & inside).sum(axis=0) + sighted(model.measurements) * inside
+        if model.balanced:
+            weighed = inside if model.unbalanced is None else inside & ~model.unbalanced
+            spare = spare + model.balanced.equations * weighed
+        spare = spare - (np.isinf(model.pose_sigmas)).sum(axis=1)  # a pose with a finite sigma is an equation, too
+        varies = model.parameters.varies
+        sigmas, moved = model.prior_sigmas[varies], (state.x - model.parameters.first)[varies]
+        values, vectors = np.linalg.eigh(seen.inverse)
+        V, roots = vectors[:, len(values) - seen.rank :], np.sqrt(np.maximum(values[len(values) - seen.rank :], 0.0))
+        D = (V * roots).T @ ((V * roots) / (sigmas * metric(model)[varies])[:, None] ** 2)
+        redundancy = int(np.maximum(spare, 0).sum()) - seen.rank + float(np.trace(D))
+        if redundancy <= 0:
+            return Noise(np.nan, 1.0, redundancy, seen.covariance, seen.information)
+        excess = float(np.sqrt(max(self.fit.cost - float(((moved / sigmas) ** 2).sum()), 0.0) / redundancy))
+        M, more = information_of(model, state, V * roots, np.eye(seen.rank) - D)
+        larger = max(1.0, excess) ** 2
+        shares, turn = np.linalg.eigh((V / roots).T @ seen.covariance @ (V / roots))
+        wide = (turn * np.sqrt(np.maximum(shares, 0.0))) @ turn.T
+        M = larger * M + D + out_of_plane(model, state, V * roots)
+        spread = roots[:, None] * (wide @ M @ wide) * roots
+        return Noise(excess, more, redundancy, V @ spread @ V.T, V @ np.linalg.inv(spread) @ V.T)
 
 
 def usual(robot: Robot, measurements: Measurements) -> tuple[str, ...]:
@@ -176,7 +210,7 @@ def _determined(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
         return model, result
 
     def directions(of_fit: Fit, seen: Observability) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        values, vectors = np.linalg.eigh(noise_of(Solved(model, of_fit, (), (), seen)).covariance[block])
+        values, vectors = np.linalg.eigh(Solved(model, of_fit, (), (), seen).noise.covariance[block])
         return values, vectors, ((of_fit.state.x - of.first) * scale)[of.varies][lengths] @ vectors
 
     values, _, away = directions(result, seen)
@@ -335,36 +369,6 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
         )
 
 
-def noise_of(solved: Solved) -> Noise:
-    """Return the noise of a fit.
-
-    Errors e of the readings with the covariance W and exact priors D give the parameters, of normal matrix H = J'J + D,
-    the covariance H^-1 (J'W J + D) H^-1. Where unknown poses have noise, the observability widens it.
-    """
-    model, state, seen = solved.model, solved.fit.state, solved.observability
-    inside = model.inside(state)
-    spare = (model.weights & inside).sum(axis=0) + sighted(model.measurements) * inside
-    if model.balanced:
-        spare = spare + model.balanced.equations * (inside if model.unbalanced is None else inside & ~model.unbalanced)
-    spare = spare - (np.isinf(model.pose_sigmas)).sum(axis=1)  # a pose with a finite sigma is an equation, too
-    varies = model.parameters.varies
-    sigmas, moved = model.prior_sigmas[varies], (state.x - model.parameters.first)[varies]
-    values, vectors = np.linalg.eigh(seen.inverse)
-    V, roots = vectors[:, len(values) - seen.rank :], np.sqrt(np.maximum(values[len(values) - seen.rank :], 0.0))
-    D = (V * roots).T @ ((V * roots) / (sigmas * metric(model)[varies])[:, None] ** 2)
-    redundancy = int(np.maximum(spare, 0).sum()) - seen.rank + float(np.trace(D))
-    if redundancy <= 0:
-        return Noise(np.nan, 1.0, redundancy, seen.covariance, seen.information)
-    excess = float(np.sqrt(max(solved.fit.cost - float(((moved / sigmas) ** 2).sum()), 0.0) / redundancy))
-    M, more = information_of(model, state, V * roots, np.eye(seen.rank) - D)
-    larger = max(1.0, excess) ** 2
-    shares, turn = np.linalg.eigh((V / roots).T @ seen.covariance @ (V / roots))
-    wide = (turn * np.sqrt(np.maximum(shares, 0.0))) @ turn.T
-    M = larger * M + D + out_of_plane(model, state, V * roots)
-    spread = roots[:, None] * (wide @ M @ wide) * roots
-    return Noise(excess, more, redundancy, V @ spread @ V.T, V @ np.linalg.inv(spread) @ V.T)
-
-
 def cleaned(solved: Solved) -> tuple[Measurements, np.ndarray]:
     """Return the measurements without their slips, and which readings are no outliers, (m, N) of bool."""
     model, x = solved.model, solved.fit.state.x
@@ -384,12 +388,12 @@ def inflation_of(noise: Noise) -> float:
     return max(1.0, noise.excess) ** 2 * noise.autocorrelation  # an excess that is nan leaves 1
 
 
-def covariance_of(solved: Solved, noise: Noise) -> np.ndarray:
+def covariance_of(solved: Solved) -> np.ndarray:
     """Return the covariance of the parameters, (p, p), in their order and units [m, 1, s].
 
     That of mass, CoM, friction, gains and zeros includes errors of cable ends that are fixed.
     """
     scale = metric(solved.model)[solved.model.parameters.varies]
-    covariance = noise.covariance / scale[:, None] / scale
+    covariance = solved.noise.covariance / scale[:, None] / scale
     covariance += considered(solved.model, solved.fit.state, solved.observability.inverse)
     return (covariance + covariance.T) / 2

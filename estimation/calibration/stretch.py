@@ -19,7 +19,7 @@ from .left_out import hardly_pull
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
 from .parameters import COMMON, GROUPS
-from .solving import Solved, covariance_of, noise_of
+from .solving import Solved, covariance_of
 from .turning import turning
 
 POSSIBLE, CERTAIN = 3.0, 4.0  # standard deviations of a compliance: of independent errors, and of all
@@ -59,7 +59,7 @@ def with_stretch(solved: Solved) -> Solved | None:
         return None
     if of.forces is None or not of.forces.motion_is_known:  # which takes longer to know
         return None
-    excess = max(1.0, float(np.nan_to_num(noise_of(solved).excess)))
+    excess = max(1.0, float(np.nan_to_num(solved.noise.excess)))
     known = "elasticity" not in more
     if known and (excess < UNEXPLAINED or "com" in groups or "com" not in more):
         return None
@@ -73,7 +73,7 @@ def with_stretch(solved: Solved) -> Solved | None:
         return None
     x = state.x.copy()
     x[varies] += step / scale[varies]
-    return solved._replace(fit=solved.fit._replace(state=state._replace(x=x)))
+    return replace(solved, fit=solved.fit._replace(state=state._replace(x=x)))
 
 
 def _some(of: Model, state: State) -> tuple[Model, State]:
@@ -107,7 +107,7 @@ def certainty(solved: Solved) -> float:
     own = np.flatnonzero(np.isin(np.flatnonzero(of.varies), places))
     if not own.size or not solved.observability.determined[own].all():
         return 0.0
-    sigmas = np.sqrt(np.diag(covariance_of(solved, noise_of(solved)))[own])
+    sigmas = np.sqrt(np.diag(covariance_of(solved))[own])
     change = (solved.fit.state.x - of.first)[places]
     return float(((change if elastic else np.abs(change)) / np.maximum(sigmas, 1e-300)).max())
 

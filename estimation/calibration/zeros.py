@@ -15,7 +15,7 @@ from .fit import held
 from .geometry import length_of
 from .normal_equations import NormalEquations, metric
 from .parameters import Parameters
-from .solving import Solved, inflation_of, noise_of
+from .solving import Solved, inflation_of
 
 USUAL = 0.1  # of the mean tension, standard deviation of zeros
 CERTAIN = 1e-6  # probability that random errors of the tensions look like zeros
@@ -57,7 +57,7 @@ def has_zeros(solved: Solved) -> bool:
     covariance = np.linalg.inv(held(equations.S, length_of(model.robot)))
     own = np.isin(np.flatnonzero(model.parameters.varies), columns)
     zeros, spread = (-covariance @ equations.b)[own], covariance[np.ix_(own, own)]
-    squares = float(zeros @ np.linalg.solve(spread, zeros)) / inflation_of(noise_of(solved))
+    squares = float(zeros @ np.linalg.solve(spread, zeros)) / inflation_of(solved.noise)
     size = np.sqrt(((zeros / scale[columns]) ** 2).mean()) / float(np.abs(measured.tensions).mean())
     if squares > largest_cost(len(zeros), CERTAIN) and size > SMALLEST:
         return True
