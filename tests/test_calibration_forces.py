@@ -12,12 +12,12 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from towline.base.errors import InputError
-from towline.estimation.calibration import Measurements, calibrate, solving, stretch
+from towline.estimation.calibration import Measurements, calibrate, outliers, solving, stretch
 from towline.estimation.calibration.autocorrelation import information_of
 from towline.estimation.calibration.balance import FeltTensions
+from towline.estimation.calibration.fit import fit
 from towline.estimation.calibration.model import Model
 from towline.estimation.calibration.normal_equations import NormalEquations
-from towline.estimation.calibration.outliers import find_outliers
 from towline.estimation.calibration.parameters import COMMON, FRAMES, GROUPS, OF_CABLE, Parameters
 from towline.estimation.calibration.solving import solve
 from towline.estimation.calibration.stretch import with_elasticity, with_stretch
@@ -411,7 +411,28 @@ def test_nothing_is_computed_twice_of_a_long_log(monkeypatch):
     solved = found._solved
     assert solved.model.poses_vary.any()
     monkeypatch.setattr(NormalEquations, "at", None)
-    assert find_outliers(solved.model, solved.fit.state)[0] == []
+    assert outliers.find_outliers(solved.model, solved.fit.state)[0] == []
+
+
+def test_some_samples_of_a_long_log_show_which_readings_are_wrong(monkeypatch):
+    """A robust fit takes as long as dozens of others, also where poses have errors, so it is one of some samples."""
+    _, robot, log = hanging(1, 0.0)
+    lengths, wrong = log.lengths.copy(), np.random.default_rng(0).choice(300, 40, replace=False)
+    lengths[wrong, wrong % 3] += 0.02 + 1e-4 * wrong
+    log = log.changed(lengths=lengths, sigma={"lengths": 3e-4, "position": 3e-4})
+    whole = solve(robot, log, ("anchors", "offsets"), {}, True)
+    counts = []
+
+    def counted(model, *rest, **options):
+        counts.extend([len(model.measurements)] if model.parameters.groups else [])
+        return fit(model, *rest, **options)
+
+    monkeypatch.setattr(outliers, "fit", counted)
+    monkeypatch.setattr(outliers, "MOST_SAMPLES", 100)
+    some = solve(robot, log, ("anchors", "offsets"), {}, True)
+    assert max(counts) == 100
+    assert {(one.cable, one.sample) for one in some.outliers} == {(k % 3, k) for k in wrong.tolist()}
+    np.testing.assert_allclose(some.fit.state.x, whole.fit.state.x, atol=1e-7)
 
 
 def test_wrong_requests_are_one_line():

@@ -263,4 +263,4 @@ def _mean_square(model: Model, state: State) -> float:
 def poses_fitted(model: Model) -> tuple[Model, State]:
     """Return the model without free parameters, and the poses that fit the lengths best with the robot's file."""
     nothing = replace(model, parameters=Parameters(model.robot, ()), prior={}, kept=None)
-    return nothing, fit_from(nothing, nothing.begin(), length_of(model.robot), enough=ENOUGH)[0].state
+    return nothing, fit_from(nothing, nothing.begin(), length_of(model.robot))[0].state

@@ -15,7 +15,7 @@ from ...models import points
 from ..logs.measurements import ARRAYS
 from ..pose.estimate import largest_cost
 from ..pose.wrong_lengths import TOLD_APART
-from .fit import fit, held
+from .fit import fit, held, settled
 from .model import Model, State
 from .normal_equations import NormalEquations, metric, pose_equations
 from .parameters import Parameters
@@ -33,6 +33,7 @@ WINDOW = 25  # samples on each side, over which a slip must be visible as a step
 VISIBLE = 0.5  # share of it that must be
 UNBALANCED = 1 - 1e-7  # share of sound samples whose forces are in better balance than those that are left out
 MOST_SAMPLES = 20_000  # of a robust fit with known poses
+SETTLED = 0.1  # decrease of the squares of a sample, in variances, that its known pose need not take
 SOFT = 4.0  # sigmas at which a reading has a quarter of its weight
 SOFTER = 4.0  # factor of the square of this limit from one step to the next
 STEPS, ENOUGH = 3, 1e-2  # of the fit at each limit, and share of the sum of squares of a step that it need not take
@@ -136,14 +137,16 @@ def robust(model: Model, state: State, length: float, rough: float = np.inf) -> 
     - `rough`: first limit, in the final ones, if the state is good enough for it.
     """
     count = len(model.measurements)
-    if model.poses_vary.any() or count <= MOST_SAMPLES:
+    if model.size_is_open or count <= MOST_SAMPLES:
         return _robust(model, state, length, rough)[:2]
     rows = np.linspace(0, count - 1, MOST_SAMPLES).astype(int)
     part = model.only(rows)
     begin = State(state.x, *(one[rows] for one in state[1:]))
     found, _, least = _robust(part, fit(part, begin, length).state, length, rough)
     at = state._replace(x=found.x)
-    sizes, limit = np.abs(model.residuals(at).readings), np.sqrt(least)
+    at = settled(model, at, SETTLED) if model.poses_vary.any() else at
+    left = project(model, at)
+    sizes, limit = np.abs(left.residuals) / np.sqrt(np.maximum(left.redundancy, SMALLEST_REDUNDANCY)), np.sqrt(least)
     clean = sizes.max() <= limit / SOFT * _threshold(sizes.size)
     return (state, model.weights) if clean else (at, model.weights & (sizes <= limit))
 
