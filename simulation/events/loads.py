@@ -89,6 +89,14 @@ class Push(Lasting):
         if self.carrier is not None and self.carrier not in flying:
             names = ", ".join(flying) or "it has none"
             raise InputError(f"must name a carrier of {robot.name!r} that flies ({names}), got {shown(self.carrier)}")
+        if self.carrier is not None:
+            return
+        locked = robot.dof_mask == 0
+        if locked[3:].sum() < 2 or any(robot.home[3:]):
+            locked[3:] &= locked[3:].all()  # an axis of rotation may have a share in each of {G}
+        if any(locked[:3] * self.force) or any(locked[3:] * self.moment):
+            free, given = ", ".join(robot.platform.dof), [*self.force, *self.moment]
+            raise InputError(f"must push {robot.name!r} along what it can move ({free}), got {shown(given)}")
 
     @override
     def begin(self, running: Running) -> None:
