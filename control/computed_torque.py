@@ -22,7 +22,7 @@ from .controllability import uncontrolled
 from .controller import Controller
 from .deviation import Deviation
 from .fallback import NEGLIGIBLE, answer_others
-from .lag import WINCHES_KEEP, Lead, rotor_lead
+from .lag import WINCHES_KEEP, Lead, RotorLead
 from .late_states import OLDEST, LateStates
 from .noise import Noise
 from .one_at_a_time import OneAtATime
@@ -146,7 +146,7 @@ class ComputedTorque(Controller):
         self._little = np.maximum(self._limits.low, SOMETHING * self._limits.high)
         self._boxes = boxes(self.robot) if far.any() else None
         self._robot, self._carried = record_of(self.robot), CarriedLoad(self.robot)
-        self._lead = rotor_lead(self.robot, rotors) if rotors else None
+        self._lead = RotorLead(self.robot, rotors) if rotors else None
         self._is_plain = not self._flies and not far.any() and self._loop is None and self._ahead is None
         self._negligible, self._deviation = NEGLIGIBLE * self.robot.force_scale, Deviation(self.robot)
         self._begin(1)
@@ -364,7 +364,7 @@ class ComputedTorque(Controller):
             memory = self._cables, self._platform, self._of_carriers, self._turning, self._actuation
             given = self._measured, self._carriers, tensions, *memory
             if self._lead is not None:
-                self._lead.pass_time(self._elapsed, self._actuation)
+                self._lead.turn(self._elapsed, self._actuation, self._of_carriers["ordered"])
             lacking = control_thrusts(self._elapsed, self._robot, self._settings, *given)
             actuation = self._actuation.copy() if self._lead is None else self._lead.sent(self._actuation)
             if lacking > self._negligible:

@@ -19,9 +19,8 @@ from .command import Command
 from .controller import Controller
 from .predictive import Predictive
 from .state import Reference, State
-from .watch import HandOver
+from .watch import HandOver, lost_carrier
 
-NOTICED = 0.6  # of a carrier's weight: force along gravity that nothing explains; lags and noise make 0.4 of it
 BLENDED = 1.0  # [s], in which the others go to their new formation
 APART = 0.01  # [s], of references that are announced
 SETTLED = 3.0  # [s], from which their motion is as predicted again
@@ -92,9 +91,6 @@ class FaultTolerant(Controller):
             reason = f"the carrier {other[0]!r}, which does not fly" if other else "winches"
             raise InputError(f"robot must be a team of flying carriers with cables of fixed length, got {reason}")
         self._team = Predictive(self.robot, **options)
-        self._weights = np.array([carrier.body.mass for carrier in self.robot.carriers if carrier.body is not None])
-        self._weights *= np.linalg.norm(self.robot.gravity)
-        self._down = np.array(self.robot.gravity) / np.linalg.norm(self.robot.gravity)
         self._rests = [_without(self.robot, index, options) for index in range(len(self.robot.carriers))]
         self.reset()
 
@@ -115,10 +111,13 @@ class FaultTolerant(Controller):
         if self._rest is None:
             command = self._team.step(time, state, reference)
             state, reference = self._as_floats(state, reference)
-            unexplained = self._team.disturbance_of_carriers[0] @ self._down
-            if self.lost is not None or not (unexplained > NOTICED * self._weights).any():
+            found = self._team.handed_over
+            lost = None if found is None else found.carrier
+            if lost is None:
+                lost = lost_carrier(self.robot, self._team.disturbance_of_carriers[0])
+            if self.lost is not None or lost is None:
                 return command
-            self._lose(time, int(np.argmax(unexplained / self._weights)), state, reference)
+            self._lose(time, lost, state, reference)
             if self._rest is None:
                 return command
         else:

@@ -3,7 +3,9 @@
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
+from ..models.part import inertia_matrix
 from ..models.robot import Robot
 
 SHORTEST = 1e-9  # [s], which divides
@@ -68,10 +70,42 @@ class Lead:
         self._given.value, self._sent = other._given.value, other._sent
 
 
-def rotor_lead(robot: Robot, lag: float) -> Lead:
-    """Return the lead of the actuators of flying carriers, (N, c, a), for a known lag [s]."""
-    limits = np.zeros((2, len(robot.carriers), max(len(carrier.actuators) for carrier in robot.carriers)))
-    for index, carrier in enumerate(robot.carriers):
-        for number, each in enumerate(carrier.actuators):
-            limits[:, index, number] = each.low, each.high
-    return Lead(lag, ROTORS_KEEP, *limits)
+class RotorLead(Lead):
+    """Lead of the actuators of flying carriers, (N, c, a), for a known lag [s].
+
+    Commands at their limits cannot make up for the lag. What this takes from the angular accelerations that carriers
+    are ordered is known, so that it is not taken for a longer lag (core/control/turning.c).
+    """
+
+    def __init__(self, robot: Robot, lag: float):
+        shape = len(robot.carriers), max(len(carrier.actuators) for carrier in robot.carriers)
+        limits, self._turning = np.zeros((2, *shape)), np.zeros((*shape, 3))  # accelerations by unit commands
+        for index, carrier in enumerate(robot.carriers):
+            for number, each in enumerate(carrier.actuators):
+                limits[:, index, number] = each.low, each.high
+                if carrier.body is not None:
+                    moment = np.array(each.wrench[3:])
+                    self._turning[index, number] = np.linalg.solve(inertia_matrix(carrier.body.inertia), moment)
+        super().__init__(lag, ROTORS_KEEP, *limits)
+
+    @override
+    def reset(self) -> None:
+        super().reset()
+        self._lost: Any = 0.0  # [rad/s^2]
+
+    def turn(self, dt: float, given: np.ndarray, ordered: np.ndarray) -> None:
+        """Write what the drives gave, as `pass_time` does, and what could be ordered last to `ordered`, (N, c, 3)."""
+        self.pass_time(dt, given)
+        ordered += self._lost
+
+    @override
+    def sent(self, wanted: np.ndarray, dt: float = 0.0) -> np.ndarray:
+        sent, given = super().sent(wanted, dt), self._given.value
+        lacks = given + (sent - given) / self._ratio - wanted
+        self._lost = np.einsum("...ca,cak->...ck", lacks, self._turning)
+        return sent
+
+    @override
+    def agree(self, other: "Lead") -> None:
+        super().agree(other)
+        self._lost = other._lost if isinstance(other, RotorLead) else 0.0

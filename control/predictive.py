@@ -27,7 +27,7 @@ from .preview import STEEPEST, Preview, turns
 from .settings import reach_of, set_reach
 from .stability import grows
 from .state import Reference, State
-from .watch import BLIND, KNOWN, LATE, PAUSE, QUICK, STEEP, UNSTABLE, HandOver, Watch
+from .watch import BLIND, KNOWN, PAUSE, QUICK, STEEP, UNSTABLE, HandOver, Watch, flaw_of_carriers
 from .weights import ripple, stage_at_home, terminal, weights
 
 TOLERANCE = 1e-6  # of the residuals of a solution
@@ -57,9 +57,9 @@ class Predictive(ComputedTorque):
     The velocity that the model predicts for the commands is compared with the measured one (control/watch.py). This
     `ComputedTorque` takes over until `reset` ("not as modelled") if a tenth of the weight, in addition to the noise of
     `sensors`, is unexplained over about 50 ms, if there is no solution for that long, if noise of the velocity requires
-    more tension than the limits permit, if carriers turn too late (core/control/turning.c), or if a pitch goes beyond
-    1.5 rad. It controls the robot from the start, with a warning, if the loop is unstable at home because
-    carriers turn before they accelerate, as with cables that begin below their CoM.
+    more tension than the limits permit, if a carrier loses its thrust or turns too late (core/control/turning.c), or if
+    a pitch goes beyond 1.5 rad. It controls the robot from the start, with a warning, if the loop is unstable at home
+    because carriers turn before they accelerate, as with cables that begin below their CoM.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
@@ -275,8 +275,8 @@ class Predictive(ComputedTorque):
             answered = self._as_planned if self._solved == time else np.full(1, SHIFTED, dtype=np.int8)
         command = self._command(tensions, answered, proof, alone=True)
         self._beside._agree(self)
-        if self._turning is not None and (lag := self._turning["lag"][0]):
-            self.handed_over = HandOver(time, f"{LATE} {1e3 * lag:.0f} ms of {2e3 / self._turned:.0f}")
+        if self._turning is not None and self.handed_over is None:
+            self.handed_over = flaw_of_carriers(time, self.robot, self._of_carriers[0], self._turning[0], self._turned)
         return command._replace(unexplained=unexplained)
 
     def _compare(self, time: float, dt: float, reference: Reference) -> None:
