@@ -73,14 +73,15 @@ class Matching:
         # the windows, their starts corrected within the noise of the recording. Their noise has that of simulations
         # too.
         self.windows = windows
+        shaken = windows.shaken()
         self._linearise(parameters)
-        echo, sensors = self._echo(self.at(parameters)), dict(windows.noise)
+        echo, sensors = self._echo(self.at(parameters), shaken), dict(windows.noise)
         # what residuals are if nothing except noise differs, in windows from the recorded state on, by kind
         self.noise = self._with_echo(sensors, echo)
         windows.noise = self._with_echo(sensors, self._project(echo))
         self._linearise(parameters)
         self.first = self.at(parameters)  # residuals with the first parameters
-        self._echoed = self._project(self._echo(self.first))
+        self._echoed = self._project(self._echo(self.first, shaken))
         # windows that are no outliers, (W,) of bool
         self.kept = self._good & (self.first.cost <= OUTLYING * np.median(self.first.cost))
 
@@ -110,9 +111,10 @@ class Matching:
         """Return (W, R + P) without what other starts would explain."""
         return vectors - (self._Q @ (self._Q.swapaxes(1, 2) @ vectors[..., None]))[..., 0]
 
-    def _echo(self, first: Match) -> np.ndarray:
+    def _echo(self, first: Match, shaken: Windows) -> np.ndarray:
         """Return what the noise of the recording does to the simulation of a match, over the noise, (W, R + P)."""
-        away = np.where(first.drift == LOST, 0.0, self.windows.shaken().predict(first.parameters)[0] - first.drift)
+        shaken.start, shaken.noise = self.windows.start, self.windows.noise
+        away = np.where(first.drift == LOST, 0.0, shaken.predict(first.parameters)[0] - first.drift)
         return np.concatenate([np.nan_to_num(away), np.zeros_like(self.windows.start)], axis=1)
 
     def _with_echo(self, noise: Mapping[str, float], echo: np.ndarray) -> dict[str, float]:
