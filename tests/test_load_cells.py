@@ -8,6 +8,7 @@ from towline.estimation.calibration import calibrate
 from towline.estimation.logs import read_log
 from towline.estimation.logs.load_cells import unreadable
 from towline.estimation.logs.recorded import read_recorded
+from towline.models import Robot
 
 from . import user_recordings as user
 
@@ -41,11 +42,18 @@ def saved(folder, rows, tensions):
     return user.write(folder / "log.csv", header, np.hstack([rows, tensions]))
 
 
+def planar(folder):
+    """The robot with 5 kg, whose file says that ends of cables are exact: usual errors of ends count for the mass."""
+    home, dof = [0, 0, 1.1, 0, 0, 0], "  dof: [x, z, pitch]\n"
+    robot = load(user.robot_file(folder / "r.yaml", ANCHORS, ATTACHMENTS, home, 5.0, extra=dof))
+    names = [f"cables[{i}].{end}.{axis}" for i in range(4) for end in ("anchor", "attachment") for axis in "xyz"]
+    stated = {"parameters": names, "covariance": (1e-12 * np.eye(24)).tolist()}
+    return Robot.model_validate(robot.model_dump() | {"uncertainty": stated})
+
+
 @pytest.mark.parametrize("fault", ["none", "dead", "saturated"])
 def test_the_mass_by_load_cells_of_which_some_measure_nothing(fault, tmp_path):
-    robot = user.robot_file(
-        tmp_path / "r.yaml", ANCHORS, ATTACHMENTS, [0, 0, 1.1, 0, 0, 0], 5.0, extra="  dof: [x, z, pitch]\n"
-    )
+    robot = planar(tmp_path)
     rows, tensions = recording()
     if fault == "dead":
         tensions[:, 2] = 0.0
@@ -71,9 +79,7 @@ def test_the_mass_by_load_cells_of_which_some_measure_nothing(fault, tmp_path):
 @pytest.mark.parametrize("decided", [True, False])
 def test_the_mass_by_load_cells_with_zeros(decided, tmp_path):
     """Zeros of up to 9 N, where tensions are 70 N: a motion shows them, and a platform at one place does not."""
-    robot = user.robot_file(
-        tmp_path / "r.yaml", ANCHORS, ATTACHMENTS, [0, 0, 1.1, 0, 0, 0], 5.0, extra="  dof: [x, z, pitch]\n"
-    )
+    robot = planar(tmp_path)
     rows, tensions = recording()
     zeros = np.array([8.0, -6.0, 9.0, -7.0])
     log = read_log(saved(tmp_path, rows, tensions + zeros), robot=robot).measurements
@@ -92,9 +98,7 @@ def test_the_mass_by_load_cells_with_zeros(decided, tmp_path):
 
 def test_the_mass_by_load_cells_with_small_zeros(tmp_path):
     """Zeros of 0.5 N, less than a hundredth of the tensions, shift the mass by five sigma if they are not estimated."""
-    robot = user.robot_file(
-        tmp_path / "r.yaml", ANCHORS, ATTACHMENTS, [0, 0, 1.1, 0, 0, 0], 5.0, extra="  dof: [x, z, pitch]\n"
-    )
+    robot = planar(tmp_path)
     rows, tensions = recording(2000)
     log = read_log(saved(tmp_path, rows, tensions + np.array([0.1, -0.5, 0.5, -0.05])), robot=robot).measurements
     found = calibrate(robot, log, free="mass")
