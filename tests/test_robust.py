@@ -236,6 +236,15 @@ def test_the_shortest_duration_is_that_of_the_share(task):
     assert found.share_of_robots(count=40, seed=7).share >= 0.95
 
 
+def test_robots_whose_errors_are_too_large_for_a_fast_motion_take_longer():
+    """Tightened by the spread of the exact robot's fastest motion, the limits leave no motion."""
+    line = {"kind": "line", "start": LEGS[0], "end": LEGS[1]}
+    task = {"path": line, "duration": {"min": 0.5, "max": 12}, "objective": {"time": 1}, "steps": 30}
+    found = plan(known("cogiro", 0.08, t_max=500.0), task | {"tube": {"position": 0.1}}, robust=0.95)
+    assert found.feasible, found.reason
+    assert found.share_of_robots(count=40, seed=7).share >= 0.95
+
+
 def test_robots_that_weigh_little_keep_their_limits_too():
     """The same robot with a millionth of all forces has the same answer."""
     data = known("wang-flying", 0.01).model_dump()
