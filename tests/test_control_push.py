@@ -31,7 +31,11 @@ def test_a_load_that_may_spin_below_its_cable_is_flown_by_predictions():
 
 
 def test_a_quadrotor_that_was_turned_far_stops_turning_in_time_with_late_rotors():
-    """At rates that its torque does not brake it turned too far for good, and kept the load 0.3 m to 0.7 m off."""
+    """At rates that its torque does not brake it turned too far for good, and kept the load 0.3 m to 0.7 m off.
+
+    Its rotors begin with the first command, so that the first turn looks much later than they are. Where that was
+    believed, all loops were slowed down, and the load was 58 mm off.
+    """
     pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")
     robot, period = slung(dof=["x", "y", "z"], inertia=[1e-3, 1e-3, 1e-3, 0, 0, 0]), 1e-3
     controller, still, tension = ComputedTorque(robot), np.zeros((1, 6)), np.array([9.81 * MASS])
@@ -44,5 +48,6 @@ def test_a_quadrotor_that_was_turned_far_stops_turning_in_time_with_late_rotors(
     for step in range(700):
         world.run(controller.step(step * period, world.state(), reference), np.zeros(6))
         off.append(np.linalg.norm(world.motions()[0, :3] - robot.home[:3]))
-    assert 0.01 < max(off) < 0.06  # 0.15 m and growing with a rate of h e / 2 for each e
+    assert 0.01 < max(off) < 0.045  # 0.15 m and growing with a rate of h e / 2 for each e
+    assert controller._platform["attitude"][0] == 40
     assert off[-1] < 0.9 * max(off)

@@ -87,14 +87,15 @@ typedef struct {
     double unseen[2]; /* time without a measured rate [s], and the integral of the ordered acceleration over it */
 } towline_turning_axis;
 
-enum { TOWLINE_TURNING_SUMS = 5 };
+enum { TOWLINE_TURNING_SUMS = 6 };
 
-/* How late the carriers of a robot turn. */
+/* How late the carriers of a robot turn. Sums over recent time are of (x - r) r', (x - r) r'', r' r', r' r'', r'' r''
+   and (x - r)^2. */
 typedef struct {
     towline_turning_axis axis[TOWLINE_MOST_CARRIERS][3];
-    double sums[TOWLINE_TURNING_SUMS]; /* over recent time, of (x - r) r', (x - r) r'', r' r', r' r'' and r'' r'' */
-    double lag;                        /* of carriers that turn too late, else 0 [s] */
-    int64_t has_begun;                 /* 1 after the first step */
+    double sums[TOWLINE_TURNING_SUMS];
+    double lag;        /* of carriers that turn too late, else 0 [s] */
+    int64_t has_begun; /* 1 after the first step */
 } towline_turning;
 
 enum { TOWLINE_MOST_TETHERS = 3 };

@@ -18,7 +18,7 @@ void towline_compensate(const towline_robot *robot, const towline_controller *co
 
 /*
  * turning.c: measure how late carriers turn, `dt` after the last step [s], with what they were `ordered` in it (c, 3);
- * nan, where actuators were at their limits, starts the comparison of that axis again, as rates do that are no numbers.
+ * an order that is not a number starts the comparison of that axis again.
  */
 void towline_measure_lag(const towline_robot *robot, double bandwidth, double dt, const double ordered[][3],
                          const towline_carrier_memory *carriers, towline_turning *it);

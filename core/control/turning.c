@@ -15,6 +15,11 @@
  * squares over all carriers and axes of a robot, and recent time. Low-pass filters with the time constant 1 / h,
  * applied twice to x and r first, give the derivatives, and remove vibrations.
  *
+ * T and C are believed if they explain nine tenths of the squares of x - r: moments that nobody ordered, or rotors
+ * that were not at rest when the comparison began, can look like a long lag. With the three axes of one carrier, and two
+ * independent values of each (a memory of 8 / h, and filters that correlate values over 4 / h), this is an F-test at the
+ * level of 1 %: 18.0 for 2 and 4 degrees of freedom.
+ *
  * An oscillation of frequency w shows a delay as T = sin(w D) / w and C = (1 - cos(w D)) / w^2. So C / T^2 is between
  * 1/2, of a slow one, and 1 / (1 + cos(w D)) = 0.81 at h D = 0.647, where w = 2.06 h.
  *
@@ -25,15 +30,16 @@
 
 #include "control/internal.h"
 
-static const double LATE = 1.5;    /* over the bandwidth: a lag of 2 is where the loop gets unstable, */
-static const double UNSTABLE = 2;  /* over the bandwidth, of T + 4 C / T, of which C is known less well */
-static const double MARGIN = 1.5;  /* of a delay */
-static const double MOST = 0.81;   /* C / T^2 of a delay with which the loop is just unstable */
-static const double WINDOW = 2;    /* over the bandwidth: in which orders and rates are compared */
-static const double MEMORY = 4;    /* windows that count, so that what is small after a turn changes nothing */
-static const double FASTEST = 1e4; /* [rad/s]: nothing turns faster */
-static const double SEEN = 0.006;  /* [rad]: what the lag makes of a carrier's attitude until it is believed */
-static const double ALIKE = 1e-3;  /* of the product of their squares: derivatives that cannot be told apart */
+static const double LATE = 1.5;      /* over the bandwidth: a lag of 2 is where the loop gets unstable, */
+static const double UNSTABLE = 2;    /* over the bandwidth, of T + 4 C / T, of which C is known less well */
+static const double MARGIN = 1.5;    /* of a delay */
+static const double MOST = 0.81;     /* C / T^2 of a delay with which the loop is just unstable */
+static const double WINDOW = 2;      /* over the bandwidth: in which orders and rates are compared */
+static const double MEMORY = 4;      /* windows that count, so that what is small after a turn changes nothing */
+static const double FASTEST = 1e4;   /* [rad/s]: nothing turns faster */
+static const double SEEN = 0.006;    /* [rad]: what the lag makes of a carrier's attitude until it is believed */
+static const double EXPLAINED = 0.9; /* of the squares of x - r */
+static const double ALIKE = 1e-3;    /* of the product of their squares: derivatives that cannot be told apart */
 
 enum { SUMS = TOWLINE_TURNING_SUMS };
 
@@ -66,11 +72,11 @@ static void follow(double bandwidth, double step, double ordered, double rate, t
     }
     const double first = per * change_of_late, second = per * per * (change - change_of_late);
     const double off = (before + it->late[1] - it->rate[1]) / 2; /* when the derivatives are these */
-    const double products[] = {off * first, off * second, first * first, first * second, second * second};
+    const double products[] = {off * first, off * second, first * first, first * second, second * second, off * off};
     for (int k = 0; k < SUMS; k++) { sums[k] += dt * products[k]; }
 }
 
-/* Return T + 4 C / T of sums, 0 if it is not positive, and write T. */
+/* Return T + 4 C / T of sums, 0 if it is not positive or not believed, and write T. */
 static double lateness(const double *sums, double *T) {
     const double size = sums[2] * sums[4] - sums[3] * sums[3];
     double C = 0;
@@ -79,7 +85,7 @@ static double lateness(const double *sums, double *T) {
         *T = (sums[0] * sums[4] - sums[1] * sums[3]) / size;
         C = (sums[1] * sums[2] - sums[0] * sums[3]) / size;
     }
-    return *T > 0 ? *T + 4 * fmin(fmax(C / *T, 0), MOST * *T) : 0;
+    return *T > 0 && *T * sums[0] + C * sums[1] > EXPLAINED * sums[5] ? *T + 4 * fmin(fmax(C / *T, 0), MOST * *T) : 0;
 }
 
 void towline_measure_lag(const towline_robot *robot, double bandwidth, double dt, const double ordered[][3],
@@ -108,5 +114,6 @@ void towline_measure_lag(const towline_robot *robot, double bandwidth, double dt
     const double rate = SEEN * WINDOW * bandwidth * bandwidth / LATE;
     double T = 0;
     const double late = it->sums[2] > rate * rate ? lateness(it->sums, &T) : 0;
-    it->lag = T * bandwidth > LATE || late * bandwidth > UNSTABLE ? fmax(T, late / MARGIN) : 0;
+    const int too_late = late > 0 && (T * bandwidth > LATE || late * bandwidth > UNSTABLE);
+    it->lag = too_late ? fmax(T, late / MARGIN) : 0;
 }
