@@ -63,7 +63,7 @@ class Rest(NamedTuple):
 class FaultTolerant(Controller):
     """Control a team of flying carriers with `Predictive`, even after one of them has lost its thrust.
 
-    A carrier is treated as lost if a force along gravity of 0.6 of its weight is not explained by its thrust, its
+    A carrier is treated as lost if a force along gravity of 0.7 of its weight is not explained by its thrust, its
     weight and its cables. Its cables are then released (`Command.released`), and the others take 1 s to reach a
     formation in which they carry the platform at the planned position. Formations and controllers are computed at
     construction for the loss of each carrier, see `statics.formation`. If there is none, a warning gives the missing

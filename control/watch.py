@@ -14,7 +14,7 @@ import numpy as np
 
 from ..models.robot import Robot
 
-LOST = 0.6  # of a carrier's weight: force along gravity that nothing explains; lags and noise make 0.4 of it
+LOST = 0.7  # of a carrier's weight: force along gravity that nothing explains; lags, noise and delays made up to 0.66
 BOUND = 0.1  # of the usual acceleration: the mean that is not predicted and permitted
 UNSTABLE = (
     "small errors at home grow under predictive control, whose model omits that carriers turn before they accelerate"
