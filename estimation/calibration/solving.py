@@ -186,16 +186,15 @@ def solve(
         model = replace(model, weights=model.weights & ~left)
         result, fitted = fit(model, result.state, length), model.weights
     model, result = _weighed(model, result, length, True)
-    model, result = _determined(model, result, length)
+    model, result, seen = _determined(model, result, length)
     if clocks is not None:
         model, result, clocks = with_carrier_clocks(model, result, measurements, clocks, length)
-    seen = observed(model, result.state, length)
-    seen = seen if clocks is None else clocks.widened(seen)
+        seen = clocks.widened(observed(model, result.state, length))
     return Solved(model, result, tuple(wrong.values()), tuple(slips), seen, clocks)
 
 
-def _determined(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
-    """Return the model that keeps the file's values where the log knows ends of cables and offsets worse, and its fit.
+def _determined(model: Model, result: Fit, length: float) -> tuple[Model, Fit, Observability]:
+    """Return the model that keeps the file's values where the log knows ends of cables and offsets worse, with its fit.
 
     These are directions with a standard deviation beyond the limit along which the fit went farther than that, without
     a prior, which would hold them. The limit is larger if changes along the other directions show larger errors of the
@@ -205,9 +204,9 @@ def _determined(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
     lengths = np.flatnonzero(np.array(of.units)[of.varies] == "m")
     lengths = lengths[np.flatnonzero(of.varies)[lengths] < of.clock]
     block, limit = np.ix_(lengths, lengths), min(LOOSE, LOOSE_SHARE * length) ** 2
-    seen = None if model.prior or not lengths.size else observed(model, result.state, length)
-    if seen is None or np.linalg.eigvalsh(seen.covariance[block])[-1] < NEARLY_LOOSE * limit:
-        return model, result
+    seen = observed(model, result.state, length)
+    if model.prior or not lengths.size or np.linalg.eigvalsh(seen.covariance[block])[-1] < NEARLY_LOOSE * limit:
+        return model, result, seen
 
     def directions(of_fit: Fit, seen: Observability) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         values, vectors = np.linalg.eigh(Solved(model, of_fit, (), (), seen).noise.covariance[block])
@@ -215,7 +214,7 @@ def _determined(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
 
     values, _, away = directions(result, seen)
     if (away[values > limit] ** 2).sum() <= limit:
-        return model, result  # about where the file has them
+        return model, result, seen  # about where the file has them
     # A fit may have gone so far that derivatives there are not those near the file.
     near = fit(replace(model, prior=dict.fromkeys(NEAR_THE_FILE.keys() & of.groups, limit**0.5)), result.state, length)
     near = near._replace(cost=model.cost(near.state))
@@ -229,7 +228,7 @@ def _determined(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
     found = fit(kept, state, length)
     before, after = (np.linalg.norm((one.state.x - of.first) * scale) for one in (result, found))
     sound = after <= before and found.converged and not (of.table(found.state.x)[:, 8] < 0).any()
-    return (kept, found) if sound else (model, result)
+    return (kept, found, observed(kept, found.state, length)) if sound else (model, result, seen)
 
 
 def _with_slip(model: Model, result: Fit, slip: Slip, length: float) -> tuple[Model, Fit, np.ndarray]:
