@@ -178,6 +178,7 @@ class LengthControl(Controller):
         reference = as_floats(required("reference", reference, Reference), self.robot, rows)
         if not is_time(time) or (self._time is not None and not float(time) > self._time):
             raise InputError(f"time must be a finite number that increases from step to step, got {shown(time)}")
+        measured = None if state.time is None else measured_at(state.time, float(time))
         dt = 0.0 if self._time is None else float(time) - self._time
         period = min(dt or np.inf, self._period)  # until the next step; more than that may have passed since the last
         period = period if np.isfinite(period) else PERIOD
@@ -186,7 +187,7 @@ class LengthControl(Controller):
         strain = self._strained(dt, tensions, far)
         if not (np.isfinite(far).all() and np.isfinite(strain).all()):
             raise InputError(f"reference must have finite lengths of cables, got pose {shown(reference.pose.tolist())}")
-        age = self._age_of(float(time), dt, state)
+        age = self._age_of(None if measured is None else float(time) - measured, dt, state)
         if np.shape(self._winches.value) != far.shape:
             self._winches.value = lengths_of(reference.pose, reference.carrier_pose) / (1.0 + strain)
         elif dt > 0:
@@ -199,9 +200,8 @@ class LengthControl(Controller):
         command = planned_command(self.robot, reference, rows)
         return command._replace(answered=status, lengths=np.broadcast_to(lengths, command.tensions.shape))
 
-    def _age_of(self, time: float, dt: float, state: State) -> float:
-        """Return the age of the measured pose [s], and remember the largest one."""
-        age = None if state.time is None else time - measured_at(state.time, time)
+    def _age_of(self, age: float | None, dt: float, state: State) -> float:
+        """Return the age of the measured pose [s], estimated if it is None, and remember the largest one."""
         known, old = np.isfinite(state.pose), self._pose if self._pose.shape == state.pose.shape else np.nan
         pose = np.where(known, state.pose, old)
         self._held = min(self._held + dt, HELD) if np.array_equal(pose, old) else 0.0

@@ -8,8 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from towline.base.errors import InputError
 from towline.estimation.calibration import Measurements, calibrate, corrected, mistake
+from towline.estimation.calibration.correction import correction_of
 from towline.estimation.logs.clocks import realigned
 from towline.models import Dynamics, load, points
+from towline.solvers import solve_batch
 
 from .recorded import motion, quaternions
 from .robots_as_built import as_built, moved_anchors, random_poses
@@ -307,3 +309,27 @@ def test_mistakes_in_two_files_with_two_clocks(what, tmp_path):
     assert float(told["notes"][0].split()[6]) == pytest.approx(7200, abs=1e-2)
     assert any(note.startswith("corrected: ") for note in told["notes"])
     assert told["residual_after"] < 3e-3
+
+
+ORDERS = {"exchanged": ([1, 0, *range(2, 8)], 1.0), "mm": (range(8), 1e3), "both": ([1, 0, *range(2, 8)], 1e3)}
+
+
+@pytest.mark.parametrize("what", ORDERS)
+def test_mistakes_with_cables_that_stretch_by_measured_tensions(what):
+    """Cables of 20 kN stretch by up to 25 cm here, which looked like a scale of each cable, or hid the order."""
+    (order, unit), rigid = ORDERS[what], load("cogiro")
+    draw, times = np.random.default_rng(2), 0.1 * np.arange(300)
+    cables = [cable.model_copy(update={"stiffness": 2e4}) for cable in rigid.cables]
+    robot = rigid.model_copy(update={"cables": tuple(cables)})
+    poses = motion(robot, times, (2, 1.2, 0.6, 0.1, 0.1, 0.1))
+    A = Dynamics(robot).wrench_matrix(poses)
+    w = Dynamics(robot).required_wrench(poses, 0 * poses, 0 * poses)
+    least = robot.t_min * (1 + np.abs(np.sin(0.5 * times)))[:, None]
+    tensions = solve_batch(A, w, least, robot.t_max, length=robot.length).tensions
+    readings = Dynamics(robot).cable_lengths(poses) / (1 + tensions / 2e4) + draw.normal(0, 5e-4, tensions.shape)
+    measured = tensions * (1 + draw.normal(0, 0.02, tensions.shape))
+    sigma = {"lengths": 1e-3, "position": 1e-3, "rotation": 1e-3}
+    log = Measurements(unit * readings[:, order], poses, times=times, tensions=measured[:, order], sigma=sigma)
+    found = correction_of(robot, log)
+    np.testing.assert_allclose(found.measurements.lengths * found.robot.encoders[:, 1], readings, atol=1e-9)
+    np.testing.assert_allclose(found.measurements.tensions, measured, atol=1e-9)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.text import counted
+from ...models.part import LARGEST
 from ..logs.measurements import Measurements, measured_poses
 from .differences import AS_GIVEN, FEWEST, PLAUSIBLE, LogPart, medians
 from .explanations import VERY_CLEARLY, Way, explanations, is_noise, rms, with_order
@@ -61,7 +62,8 @@ def _tried(log: Unexplained, order: np.ndarray) -> Iterator[_Framed]:
     ordered = log.log._replace(y=log.log.y[:, order])
     frames, read = _fitted(log, ordered)
     moved, there, left = _placed(log, ordered, frames, read)
-    if not is_noise(there, left):  # speeds show the clock in the right frame only
+    # Speeds show the clock in the right frame only, which is not the one of readings in another unit.
+    if not is_noise(there, left) and np.abs(moved[0]).max() < LARGEST:
         whole = corrected_to(log.given, moved, order, 1.0)
         there, left = (aligned(log.robot, whole, log.rows, log.table) or there).sound()
     yield _Framed(frames, read, _as_they_are(there, left), moved)

@@ -9,13 +9,14 @@ from ...base.display import Displayed
 from ...models import points
 from ...models.robot import Robot
 from ..logs.clocks import LIKE, SURELY, realigned
-from ..logs.encoders import locked
+from ..logs.encoders import locked, stretched
 from ..logs.measurements import Measurements, measured_poses
 from .differences import PLAUSIBLE, LogPart
 from .explanations import Way
 
 EXPLAINED = 0.1  # of the change of the readings, which differences are below if lengths and poses belong together
 FAR = 3.0  # times the noise, of differences that are not explained yet
+MOST_STRETCHED = 1.05  # of a length: no cable is stretched more
 STILL = 2e-3  # of a length, by which the reading of a locked winch with noise may change
 
 
@@ -23,7 +24,9 @@ def part_of(robot: Robot, part: Measurements, table: np.ndarray) -> LogPart:
     """Return measurements as a part of a log."""
     position, rotation, known = measured_poses(robot, part)
     angles = points.angles(rotation) if part.poses is None else np.where(known[:, 3:], part.poses[:, 3:], 0.0)
-    y = part.lengths * table[:, 7]
+    # An unknown tension stretches no cable here, and one in another unit, or of no cable, hardly any.
+    stretch = np.clip(np.nan_to_num(stretched(robot, part.tensions), nan=1.0), 1.0, MOST_STRETCHED)
+    y = part.lengths * table[:, 7] * stretch
     return LogPart(robot, table, position, rotation, angles, y, part.sigma.lengths, part.carrier_poses)
 
 

@@ -12,9 +12,13 @@ PERIODS = (*(2.0**k for k in range(8, 33)), 360.0, 2 * np.pi)  # of counters, an
 def lengths_of(robot: Robot, readings: np.ndarray, tensions: np.ndarray | None = None) -> np.ndarray:
     """Return cable lengths (..., m) [m] of readings, by the encoders of the file, under tensions [N] where measured."""
     offset, scale, build_up = robot.encoders.T
+    return (offset + (scale + build_up * readings) * readings) * stretched(robot, tensions)
+
+
+def stretched(robot: Robot, tensions: np.ndarray | None) -> np.ndarray | float:
+    """Return lengths over unstrained lengths, (..., m), of cables with a stiffness under tensions [N], or 1."""
     by = np.array([1 / cable.stiffness if cable.stiffness else 0.0 for cable in robot.cables])
-    stretch = 1.0 if tensions is None else 1 + np.maximum(tensions, 0.0) * by
-    return (offset + (scale + build_up * readings) * readings) * stretch
+    return 1.0 if tensions is None else 1 + np.maximum(tensions, 0.0) * by
 
 
 def readings_of(robot: Robot, lengths: np.ndarray) -> np.ndarray:
