@@ -249,7 +249,8 @@ class LengthControl(Controller):
             behind = np.zeros(1)  # planned minus measured speeds of the cables, (..., m) [m/s]
             if lead:
                 wanted, measured = (velocity * free)[..., None], (state.velocity * free)[..., None]
-                behind = (jacobian(pose, carriers) @ wanted - jacobian(state.pose, carriers) @ measured)[..., 0]
+                seen_at = np.where(np.isfinite(state.pose), state.pose, pose)  # what is missing is not `known` below
+                behind = (jacobian(pose, carriers) @ wanted - jacobian(seen_at, carriers) @ measured)[..., 0]
             known = np.asarray(np.isfinite(error).all(axis=-1) & np.isfinite(behind).all(axis=-1))
         before = np.zeros_like(error) if self._sum is None or self._sum.shape != error.shape else self._sum
         total = before + dt * np.where(known[..., None], error * free, 0.0)

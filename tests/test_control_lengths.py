@@ -159,9 +159,17 @@ def test_beyond_its_bound_it_says_hold(model):
     assert run.record.answered[-1] == HOLD
     state = State(model.home, np.zeros(6), model.carrier_home, np.zeros_like(model.carrier_home))
     controller.reset()
-    first = controller.step(0.0, state, run.references[0])
+    assert controller.step(0.0, state, run.references[0]).answered == PLANNED
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.01])
+@pytest.mark.parametrize("missing", [np.nan, np.inf])
+def test_without_a_pose_the_last_correction_stays(model, motion, lag, missing):
+    controller, reference = LengthControl(model, lag=lag, proportional=1.0, integral=0.0), references(motion, 0.1)[0]
+    still = np.zeros(6), model.carrier_home, np.zeros_like(model.carrier_home)
+    first = controller.step(0.0, State(reference.pose + 1e-3 * np.eye(6)[2], *still), reference)
     assert first.answered == PLANNED
-    lost = controller.step(1e-3, state._replace(pose=np.full(6, np.nan)), run.references[0])
+    lost = controller.step(0.1, State(np.full(6, missing), *still), reference)
     assert lost.answered == HOLD
     np.testing.assert_allclose(wound(lost), wound(first))
 
