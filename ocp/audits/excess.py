@@ -27,7 +27,6 @@ class Excess(Displayed):
     accepted: Literal["at most", "at least", "exactly"] = "at most"  # side of the bound on which the value must be
     why: str = ""  # explanation; may be empty
     what: str = ""  # what the value is, if it is not that of the limit: "distance from its path"
-    what: str = ""  # what the value is, if it is not that of the limit: "distance from its path"
     # The value with which the program would keep the limit, if that is another: that of a distance has no least, but a
     # thin region is nowhere deep. It is the bound where a tighter one at the nodes would not help.
     between: float | None = None
