@@ -167,7 +167,7 @@ class LengthControl(Controller):
         """Return the lengths for the time from `time` [s] on, with the planned tensions and motion of the carriers.
 
         The correction needs the pose of the state, and with a lag its velocity; without these, the last one stays.
-        A state is compared with the plan at its time.
+        A state is compared with the plan at its time; a pose that is older than 1 s counts as missing.
 
         Raises:
             InputError: If an argument has a wrong shape or value, the lengths of the reference overflow, or no tensions
@@ -195,6 +195,8 @@ class LengthControl(Controller):
         given, lead = self._winches.value, _lead(self._lag, period)
         self._sent = given + lead / period * (far / (1.0 + strain) - given)
         planned = self._planned_at(float(time) - age, float(time), reference)
+        if age > MEMORY:  # the plan of its time is forgotten
+            state = state._replace(pose=np.full_like(state.pose, np.nan))
         corrected, status = self._correction(dt, period, lead - period, planned, state, reference)
         lengths, self._strain, self._time = self._sent + corrected, strain, float(time)
         command = planned_command(self.robot, reference, rows)

@@ -163,13 +163,13 @@ def test_beyond_its_bound_it_says_hold(model):
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.01])
-@pytest.mark.parametrize("missing", [np.nan, np.inf])
-def test_without_a_pose_the_last_correction_stays(model, motion, lag, missing):
+@pytest.mark.parametrize(("missing", "measured"), [(np.nan, None), (np.inf, None), (0.5, -1.5)])
+def test_without_a_pose_or_with_an_old_one_the_last_correction_stays(model, motion, lag, missing, measured):
     controller, reference = LengthControl(model, lag=lag, proportional=1.0, integral=0.0), references(motion, 0.1)[0]
     still = np.zeros(6), model.carrier_home, np.zeros_like(model.carrier_home)
     first = controller.step(0.0, State(reference.pose + 1e-3 * np.eye(6)[2], *still), reference)
     assert first.answered == PLANNED
-    lost = controller.step(0.1, State(np.full(6, missing), *still), reference)
+    lost = controller.step(0.1, State(np.full(6, missing), *still, time=measured), reference)
     assert lost.answered == HOLD
     np.testing.assert_allclose(wound(lost), wound(first))
 
