@@ -432,7 +432,7 @@ def test_a_plan_that_rests_on_the_ground_is_no_silent_reference():
 
 def test_a_push_that_a_robot_cannot_follow_is_refused():
     planar = load("planar-4")
-    simulate(planar, planar.home, duration=0.01, events=["push 1 0 2 0 0.1 0 at 0"])
+    simulate(planar, planar.home, duration=0.01, events=["push 1 1e-16 2 0 0.1 0 at 0"])
     for name, words in (("planar-4", "0 1 0"), ("planar-4", "0 0 0 1 0 0"), ("point-mass-3", "0 0 0 0 1 0")):
         with pytest.raises(InputError, match=rf"^events\[0\] must push '{name}' along what it can move \(x, "):
             simulate(name, load(name).home, duration=0.01, events=[f"push {words} at 0"])

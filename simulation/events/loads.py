@@ -16,6 +16,8 @@ from ...models.rigid_load import RigidLoad
 from ...models.robot import Robot
 from .event import Event, Running, Seconds, number_in
 
+ROUNDING = 1e-9  # of a force or moment, which may have been computed
+
 
 class Carry(RigidLoad, Event):
     """The platform carries a load from now on, instead of any earlier one; a mass of 0 releases it.
@@ -94,7 +96,8 @@ class Push(Lasting):
         locked = robot.dof_mask == 0
         if locked[3:].sum() < 2 or any(robot.home[3:]):
             locked[3:] &= locked[3:].all()  # an axis of rotation may have a share in each of {G}
-        if any(locked[:3] * self.force) or any(locked[3:] * self.moment):
+        wrench = np.reshape([self.force, self.moment], (2, 3))
+        if (np.abs(wrench * locked.reshape(2, 3)) > ROUNDING * np.linalg.norm(wrench, axis=1, keepdims=True)).any():
             free, given = ", ".join(robot.platform.dof), [*self.force, *self.moment]
             raise InputError(f"must push {robot.name!r} along what it can move ({free}), got {shown(given)}")
 
