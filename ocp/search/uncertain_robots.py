@@ -101,7 +101,7 @@ def _near(robot: Robot, task: Task, share: float, climb: Climb, tried: list[Plan
             low = middle
         else:
             high = middle
-    if most := _most(plans, lambda plan, part: judged(plan, robot, part), FEWEST, int(np.ceil(100 * share))):
+    if most := _most(plans, lambda plan, part: judged(plan, robot, part), FEWEST, int(np.ceil(round(100 * share, 6)))):
         found.append(Relaxed("robust", "", share, *most))
     if most := _most(plans, lambda plan, part: judged(plan, _surer(robot, part), share), LEAST_ERRORS, 100):
         found.append(Relaxed("uncertainty", "", 1.0, *most, "of its standard deviations"))
