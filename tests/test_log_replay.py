@@ -217,6 +217,19 @@ def test_a_corrected_log_is_replayed_as_if_it_were_right(tmp_path):
         replay("multi-quadrotor-3", tmp_path / "wrong.csv", fix=True)
 
 
+@pytest.mark.parametrize("both", [False, True])
+def test_commanded_lengths_are_corrected_only_if_they_have_the_errors_of_the_readings(both, tmp_path):
+    found = columns("tensions", every("tensions", 50))
+    right = np.column_stack([found[f"l{i} [m]"] for i in range(4)])
+    wrong = 1e3 * right[:, [1, 0, 2, 3]]
+    found |= {f"l{i} [m]": wrong[:, i] for i in range(4)}
+    found |= {f"l{i}_cmd [m]": (wrong if both else right)[:, i] for i in range(4)}
+    corrected = read_recorded("planar-4", written(tmp_path / "wrong.csv", found), fix=True)
+    assert corrected.commanded == "lengths"
+    np.testing.assert_allclose(corrected.lengths, right, rtol=1e-12)
+    np.testing.assert_allclose(corrected.commands, right, rtol=1e-12)
+
+
 def test_positions_that_were_not_measured_are_no_small_errors(tmp_path):
     """With three of four poses missing the quantile is that of the measured ones."""
     found = replay("planar-4", written(tmp_path / "log.csv", columns("tensions", every("tensions", 50))))

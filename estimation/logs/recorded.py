@@ -63,13 +63,14 @@ def read_recorded(
 
     - `robot`: the robot; its moving carriers are found by their names.
     - `log`, `poses`, `fields`: as `path`, `poses` and `fields` of `read_measurements`.
-    - `fix`: True to correct probable input errors of the log, also in its commands and with the encoders of the robot.
+    - `fix`: True to correct probable input errors of the log, also with the encoders of the robot and in its commands.
+      Commanded lengths that agree better with the corrected readings without this are used as recorded.
 
     Raises `InputError` as `read_measurements`, if the log has no times, or with `fix` as `corrected` and if carriers
     move.
     """
     known = as_robot(robot)
-    columns: slice | np.ndarray = slice(None)  # of the log, in the order of the cables
+    encoded, columns = known, np.arange(known.m)  # of the log, in the order of the cables
     if fix and any(carrier.moves for carrier in known.carriers):
         raise InputError(f"fix must be False for a robot whose carriers move, as those of {known.name}, got True")
     try:
@@ -103,6 +104,10 @@ def read_recorded(
                 raise InputError(f"{which[0].full} must be one of {size} fields, got {len(which)}")
             return filled(times, reader.stream(which), which[0])[:, columns]
 
+        def apart(commands: np.ndarray) -> float:
+            away = commands - lengths_of(known, measured.lengths)
+            return float(np.median(np.abs(away - np.median(away, axis=0)), axis=0).sum())
+
         efforts = at(found.efforts, known.m) if measured.tensions is None else None
         commands, is_length = at(found.commands, known.m), bool(found.commands) and found.commands[0].unit in LENGTHS
         motors = bool(found.commands) and re.search("motor(?!.*tension)", found.commands[0].full.lower()) is not None
@@ -110,7 +115,9 @@ def read_recorded(
         if lengths is not None and efforts is not None:  # which are lengths under tension
             lengths = lengths / lengths_of(known, np.ones_like(efforts), efforts) * lengths_of(known, np.ones(known.m))
         if commands is not None and is_length:
-            commands = lengths_of(known, commands)
+            # Readings may have errors that the commands do not have.
+            as_read = lengths_of(encoded, commands[:, np.argsort(columns)])
+            commands = min(lengths_of(known, commands), as_read, key=apart)
         if found.commands and found.commands == read.fields.lengths:  # which are not measured
             lengths = None
         sensed = not found.commands or found.commands != read.fields.tensions
