@@ -206,7 +206,7 @@ class LengthControl(Controller):
         """Return the age of the measured pose [s], estimated if it is None, and remember the largest one."""
         known, old = np.isfinite(state.pose), self._pose if self._pose.shape == state.pose.shape else np.nan
         pose = np.where(known, state.pose, old)
-        self._held = min(self._held + dt, HELD) if np.array_equal(pose, old) else 0.0
+        self._held = min(self._held + dt, HELD) if np.array_equal(pose, old, equal_nan=True) else 0.0
         self._pose, self._unseen = pose, 0.0 if known.all(axis=-1).any() else self._unseen + dt
         # A robot at rest has the same pose for long, which is no reason for smaller gains.
         largest = self._unseen + (self._longest if age is None else age)

@@ -189,6 +189,18 @@ def test_rows_are_as_alone(model, motion):
             assert one.answered == both.answered[row]
 
 
+def test_a_robot_without_a_pose_does_not_change_the_others(model, motion):
+    """Poses that are held tell their age, also beside a robot of which none is measured."""
+    both, alone = LengthControl(model), LengthControl(model)
+    still = np.zeros(6), model.carrier_home, np.zeros_like(model.carrier_home)
+    wanted = references(motion, 0.02)[:20]
+    for k, reference in enumerate(wanted):
+        pose = wanted[k - k % 5].pose
+        rows = State(np.stack([pose, np.full(6, np.nan)]), *(np.stack([one, one]) for one in still))
+        one = alone.step(0.02 * k, State(pose, *still), reference)
+        np.testing.assert_allclose(wound(both.step(0.02 * k, rows, reference))[0], wound(one), rtol=1e-13)
+
+
 def test_angles_are_compared_round_the_circle(model):
     pose = np.r_[model.home[:5], np.pi - 1e-3]
     state = State(np.r_[model.home[:5], -np.pi + 1e-3], np.zeros(6), model.carrier_home, np.zeros((1, 6)))
