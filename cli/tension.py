@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -78,7 +79,7 @@ def _show_slipped_units(robot: Robot, pose: np.ndarray, wind: np.ndarray | None)
 
     task = {"path": {"kind": "rest", "pose": pose.tolist()}, "wind": None if wind is None else wind.tolist()}
     for sentence in slipped_units(robot, Task.model_validate(task)):
-        typer.echo(sentence.replace("path.pose", "--pose"))
+        typer.echo(re.sub(r"\b(path\.pose|wind)(?=[,:])", lambda key: f"--{key[0].removeprefix('path.')}", sentence))
 
 
 def _solve(problem: TensionProblem, method: str, backend: str | None = None) -> TensionSolution:

@@ -110,6 +110,7 @@ def test_tension_prints_the_promised_keys():
 def test_tension_asks_whether_a_pose_is_in_degrees():
     assert "--pose: 45 rad is too large" in run("tension", "cogiro", "--pose", "0 0 2 0 45 0").stdout
     assert "too large" not in run("tension", "cogiro", "--pose", "0 0 2 0 0.45 0").stdout
+    assert "--wind: 90 m/s is too large" in run("tension", "wang-flying", "--wind", "90 0 0", code=1).stdout
 
 
 @pytest.mark.parametrize(
