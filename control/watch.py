@@ -48,6 +48,7 @@ def lost_carrier(robot: Robot, forces: np.ndarray) -> int | None:
     gravity = np.array(robot.gravity)
     masses = [0.0 if carrier.body is None else carrier.body.mass for carrier in robot.carriers]
     excess = forces @ gravity - LOST * np.array(masses) * (gravity @ gravity)
+    excess = np.nan_to_num(excess, nan=-np.inf)  # an unknown force must not hide that of another carrier
     index = int(np.argmax(excess))
     return index if excess[index] > 0 else None
 

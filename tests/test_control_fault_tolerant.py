@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 from towline import InputError, load, plan, simulate
 from towline.cli.main import app
 from towline.control import FaultTolerant, Reference, State, fault_tolerant
+from towline.control.watch import lost_carrier
 from towline.models import Robot
 from towline.statics.distribution import tensions
 from towline.statics.formation import formation
@@ -174,3 +175,12 @@ def test_wrong_input_is_one_line(prepared, tmp_path, monkeypatch):
     plan(load("wang-flying"), {"path": line, "duration": 0.3}).save("step.nc")
     refused = CliRunner().invoke(app, ["simulate", "wang-flying", "step.nc", "--controller", "fault-tolerant"])
     assert isinstance(refused.exception, InputError)
+
+
+def test_an_unknown_force_on_one_carrier_does_not_hide_that_another_has_lost_its_thrust():
+    robot = load("multi-quadrotor-3")
+    forces = np.zeros((3, 3))
+    forces[1] = robot.carriers[1].body.mass * np.array(robot.gravity)
+    forces[0] = np.nan
+    assert lost_carrier(robot, forces) == 1
+    assert lost_carrier(robot, 0.5 * forces) is None
