@@ -71,6 +71,7 @@ def test_ends_of_the_tube(frame, coordinate):
     assert set(told) == {"tube.ends"}
     assert [excess.time for excess in told["tube.ends"]] == [0, LASTS]
     assert [excess.value for excess in told["tube.ends"]] == pytest.approx([SMALL] * 2, rel=1e-3)
+    assert str(told["tube.ends"][0]).startswith("tube.ends of the platform: distance from its path must be 0 ")
     late = moved(scenario, none, None, coordinate, SMALL * NODES**2 * (NODES - LASTS))  # speed at the end alone
     told = found(scenario, late)
     assert set(told) == {"tube.ends"}
