@@ -42,7 +42,7 @@ def explanations(log: LogPart, e: np.ndarray, noise: float) -> tuple[list[Way], 
 
     order, as_given = np.arange(log.robot.m), np.inf
     ways: list[Way] = []
-    turns: list[tuple[np.ndarray, Way]] = []
+    conventions: list[tuple[np.ndarray, Way]] = []
     tried = interpretations(bool(np.ptp(log.angles, axis=0).any()))
     base, rough = log.parts(tried[0]), log.roughness(tried)
     for way, own in zip(tried, rough, strict=True):
@@ -59,7 +59,7 @@ def explanations(log: LogPart, e: np.ndarray, noise: float) -> tuple[list[Way], 
             as_given = one
         elif way.turned and way.placed is tried[0].placed:
             other = (lengths - way.factor * y[order, order])[:, : len(log.y)]
-            turns.append((other, Way(one, one, way.text, way, order, same)))
+            conventions.append((other, Way(one, one, way.text, way, order, same)))
         else:
             ways.append(Way(VERY_CLEARLY * one, one, way.text, way, order, same))
         if text := with_order(way.text, columns, signs):
@@ -72,7 +72,7 @@ def explanations(log: LogPart, e: np.ndarray, noise: float) -> tuple[list[Way], 
             ways.append(Way(weighted, size, text, way, columns, signs))
         if way.factor == 1.0:
             ways += _multiples(lengths, y, len(log.y), way)
-    likeliest = _likeliest(e, turns)
+    likeliest = _likeliest(e, conventions)
     if likeliest is not None:
         # Errors that are no noise may seem smaller in another convention by chance.
         sure = root_mean_square(likeliest[0]) <= noise
@@ -121,16 +121,16 @@ def _likelier(e: np.ndarray, other: np.ndarray) -> float:
     return float((one**2).sum() - (two**2).sum()) / max(spread, 1e-300)
 
 
-def _likeliest(e: np.ndarray, turns: list[tuple[np.ndarray, Way]]) -> tuple[np.ndarray, Way] | None:
+def _likeliest(e: np.ndarray, conventions: list[tuple[np.ndarray, Way]]) -> tuple[np.ndarray, Way] | None:
     """Return the convention of angles that is much more likely than the given one, with its equivalents."""
     best: tuple[np.ndarray, Way] | None = None
-    for turn in turns:
-        if _likelier(e if best is None else best[0], turn[0]) > (SIGNIFICANT if best is None else 0.0):
-            best = turn
+    for convention in conventions:
+        if _likelier(e if best is None else best[0], convention[0]) > (SIGNIFICANT if best is None else 0.0):
+            best = convention
     if best is None:
         return None
     other, way = best
-    equals = [one.text for left, one in turns if one.text != way.text and _likelier(left, other) < TOLD_APART]
+    equals = [one.text for left, one in conventions if one.text != way.text and _likelier(left, other) < TOLD_APART]
     if len(equals) > 1:
         unknown = "the angles seem to have another convention, which cannot be determined"
         return other, way._replace(text=unknown, several=True)
