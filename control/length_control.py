@@ -167,7 +167,7 @@ class LengthControl(Controller):
         """Return the lengths for the time from `time` [s] on, with the planned tensions and motion of the carriers.
 
         The correction needs the pose of the state, and with a lag its velocity; without these, the last one stays.
-        A state is compared with the plan at its time; a pose that is older than 1 s counts as missing.
+        A state is compared with the plan at its time; a pose that is older than 1 s is treated as missing.
 
         Raises:
             InputError: If an argument has a wrong shape or value, the lengths of the reference overflow, or no tensions

@@ -24,7 +24,7 @@ class Winch(Part):
     friction: NonNegative = optional("dry friction, as a force on the cable [N]", 0.0)
     speed_max: Positive = Field(description="largest speed of the cable [m/s]")
     force_max: Positive = Field(
-        description="largest force of the motor on the cable; friction reduces what is left for the tension [N]"
+        description="largest force of the motor on the cable; tensions are at most this less `friction` [N]"
     )
 
     @model_validator(mode="after")

@@ -13,7 +13,7 @@ from ..logs.measurements import Measurements, measured_poses
 from ..logs.smoothing import FEWEST, Parabolas, continuous, widest_parabola, within
 from .parameters import Parameters
 
-FEWEST_MOVING = 50  # samples without times that can be told from poses at rest
+FEWEST_MOVING = 50  # samples without times; fewer are always taken to be at rest
 SMALL, SMOOTH = 0.05, 0.7  # steps of a motion over its extent, and their changes over the steps
 SLOWEST = 0.2  # [s] between samples of a motion; if they are farther apart, the platform is taken to be at rest
 
