@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from ..base.text import quantity
 from . import style
 
 WITHIN_95 = 2.795  # standard deviations: the root of the 95 % quantile of chi-square with three degrees of freedom
 DOTS: dict[str, Any] = {"linestyle": "none", "markersize": 2.0, "markeredgewidth": 0.0, "rasterized": True}
 MOST_SAMPLES = 2000  # of a cable in a panel: more are not visible, and files grow
+SMALLEST_SPAN = 1e-3  # [mm], to either side of zero: smaller residuals are rounding
 
 
 def residuals(
@@ -72,8 +74,9 @@ def _of_cables(ax: style.Axes, values: np.ndarray, times: np.ndarray | None) -> 
     for cable in range(values.shape[1]):
         look = DOTS | {"marker": style.marker(cable), "color": style.colour(cable), "label": f"cables[{cable}]"}
         ax.plot(at[::step], 1e3 * values[::step, cable], **look)
-    rms = 1e3 * float(np.sqrt(np.nanmean(values**2)))
-    style.heading(ax, f"root mean square {rms:.3g} mm")
+    low, high = ax.get_ylim()
+    ax.set_ylim(min(low, -SMALLEST_SPAN), max(high, SMALLEST_SPAN))
+    style.heading(ax, f"root mean square {quantity(1e3 * float(np.sqrt(np.nanmean(values**2))), 'mm', 3)}")
 
 
 def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray) -> style.Figure:
