@@ -1,17 +1,26 @@
-"""The papers' motions in forward time: each essential figure of the claims by a second derivation."""
+"""The papers' motions in forward time: each essential figure of the claims by a second derivation, and the command."""
 
+import json
 import re
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
+from typer.testing import CliRunner
 
+from towline.cli.main import app
+from towline.figures import style
 from towline.models import Dynamics, load
 from towline.studies.accounts.claim import Verdict
 from towline.studies.flying import flights, motion, plans, shaken, wind
 from towline.studies.flying.wound import FLIGHT, PERIOD
+from towline.studies.papers import FLYING
 from towline.studies.towing import flights as towed
+
+from .numbered import misplaced, unnamed
 
 GRAVITY = np.array([0, 0, -9.81])
 
@@ -22,22 +31,32 @@ def robot():
 
 
 @pytest.fixture(scope="module")
-def circle(robot):
+def flown_once():
+    """Keep the simulations that the command makes, which the other tests look at."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module, names in ((flights, ("fly", "small_circle")), (shaken, ("shake", "release", "blow"))):
+            for name in names:
+                patch.setattr(module, name, cache(getattr(module, name)))
+        yield
+
+
+@pytest.fixture(scope="module")
+def circle(robot, flown_once):
     return flights.fly(robot, "circle")
 
 
 @pytest.fixture(scope="module")
-def hovering(robot):
+def hovering(robot, flown_once):
     return flights.small_circle(robot, 0.0), flights.small_circle(robot, flights.AWAY)
 
 
 @pytest.fixture(scope="module")
-def seen(robot):
+def seen(robot, flown_once):
     return shaken.shake(robot)
 
 
 @pytest.fixture(scope="module")
-def vibrations():
+def vibrations(flown_once):
     return {claim.id: claim for claim in shaken.chapter().claims}
 
 
@@ -55,6 +74,43 @@ def drag(robot, air):
     along = aero.drag * air[:, :2] * np.abs(air[:, :2])
     lift = aero.lift * (air[:, :2] ** 2).sum(axis=1)
     return 0.5 * aero.air_density * aero.area * np.column_stack([along, lift])
+
+
+def test_the_command_reproduces_the_paper(flown_once, tmp_path, monkeypatch):
+    monkeypatch.setattr(style, "svg", lambda figure: "<svg/>")  # each figure is printed into its file
+    arguments = ["reproduce", "flying", "--out", str(tmp_path / "out"), "--json"]
+    printed = json.loads(CliRunner().invoke(app, arguments, catch_exceptions=False).stdout)
+    assert printed["complete"]
+    assert {"id", "printed", "computed", "verdict"} <= set(printed["claims"][0])
+    names = [claim["id"] for claim in printed["claims"]]
+    assert len(names) == len(set(names)) > 50
+    assert not unnamed("flying", [claim["place"] for claim in printed["claims"]])
+    by_name = {claim["id"]: claim for claim in printed["claims"]}
+    assert not misplaced("flying", {name: Verdict(claim["verdict"]) for name, claim in by_name.items()})
+    assert by_name["circle"]["verdict"] == "impossible"
+    places = {by_name[name]["place"] for name in ("VI.A-flown", "VI.B-flown", "circle-repair", "helix-repair")}
+    assert places <= {"VI.A", "VI.B", "VI.A, figure 6", "VI.B, figure 8"}
+    for name in ("circle-repair", "helix-repair", "VI.A-flown", "VI.B-flown", "flown-positive"):
+        assert by_name[name]["verdict"] == "repaired"
+        assert by_name[name]["statement"].startswith("Not in the paper: ")
+        assert by_name[name]["printed"] is None
+    assert {"circle", "radius", "circle-any-pairing"} <= {
+        name for name, claim in by_name.items() if claim["verdict"] == "impossible"
+    }
+    assert by_name["fig-11"]["verdict"] == "not determined"
+    assert by_name["eq-6-flown"]["verdict"] == "reproduced"
+    assert by_name["conclusion-stability"]["verdict"] == by_name["VI.C-flown"]["verdict"] == "not determined"
+    assert by_name["fig-10-tension"]["verdict"] == "differs"
+    assert all(Path(file).stat().st_size > 0 for file in printed["files"])
+    drawn = {Path(file).stem for file in printed["files"] if file.endswith(".png")}
+    assert {claim["figure"] for claim in printed["claims"]} - {None} <= drawn
+    page = (tmp_path / "out" / "flying.html").read_text()
+    assert page.count("<details>") == len(names)
+    assert page.count("data:image/svg+xml") == len(drawn)
+    assert not re.search(r'(src|href)="(?!data:|#claim-|#chapter-|#errata)', page)
+    errata = (tmp_path / "out" / "flying-errata.md").read_text()
+    assert all((f"(`{name}`):" in errata) == (by_name[name]["verdict"] != "reproduced") for name in names)
+    assert FLYING in errata
 
 
 # --- paper F: flights
