@@ -130,6 +130,8 @@ def _show(robot: Robot, result: dict[str, Any], at_home: TensionSolution, box: R
     rank = f"rank {result['rank']} {of} at home{reason}"
     if result["rank"] < len(robot.platform.dof):
         rank += f"; highest rank near home: {highest}"
+        if max(result["rank_level"], result["rank_tilted"]) < len(robot.platform.dof) <= robot.m:
+            rank += "\n    cross the cables, or list in platform.dof only the coordinates that they can control"
     drive = "winches" if robot.drive == "both" and not any(carrier.moves for carrier in robot.carriers) else robot.drive
     carriers = f"{_count(result['carriers'])} carrier{'s' * (len(robot.carriers) != 1)}"
     lines = [

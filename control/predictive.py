@@ -69,9 +69,9 @@ class Predictive(ComputedTorque):
             At most 1.2 / `stage` has an effect, 0.45 / `stage` if carriers correct errors.
         stages, stage: Number of stages, and duration of each [s]. Default: 20 of 0.015 s; of 0.03 s if carriers may
             leave their reference, because they are slower; of 0.025 s if carriers correct errors. In slow loops, stages
-            become as long as the steps, at most 0.21 s. A loop is slow if the references of `follow` are farther apart
-            than twice the default (with carriers that fly: than the default), and so are the first two steps or three
-            in a row. A given duration is kept, with a warning if steps are more than 1.2 / `bandwidth` apart.
+            become as long as the steps, at most 0.21 s. A loop is slow if the period given to `follow` is longer than
+            two default stages (with carriers that fly: than one), and so are the first two steps or three in a row. A
+            given duration is kept, with a warning if steps are more than 1.2 / `bandwidth` apart.
         reach: Intended maximum deviation of carriers from their reference: position [m] and attitude [rad]. A soft
             scale, not a limit: at this deviation a carrier costs as much as a tension error of 5 % of the robot's
             weight. With cables of fixed length it is at least 2 % of their length. Default: 0, but 6 % of the cables'

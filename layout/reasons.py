@@ -86,7 +86,7 @@ def reasons(evaluation: Evaluation, goal: Goal, y: np.ndarray) -> Reasons:
     return Reasons(
         tuple(binding),
         tuple(Advice(one.change, one.gain / unit, one.unit.replace("N/", name, 1)) for one in advice),
-        bool(found.left <= _CONVERGED * scale),
+        bool(found.left <= _CONVERGED * scale and evaluation.missing(y) <= 0.0),
         int(bound.sum()),
         of_margin,
     )

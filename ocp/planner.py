@@ -190,8 +190,8 @@ class Planner(Displayed):
                 from the previous feasible plan.
 
         Raises:
-            InputError: If there is no feasible plan yet, if the task has phases, exact waypoints or a path in the frame
-                of a carrier, or if an argument does not fit.
+            InputError: If there is no feasible plan yet, if the task has phases, exact waypoints, `robust`,
+                `stop_within`, or a path in the frame of a carrier or of kind return, or if an argument does not fit.
         """
         check_progress(progress)
         if self._flown is None:

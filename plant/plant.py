@@ -137,7 +137,7 @@ class Plant:
             carrier_pose, carrier_velocity: The same for the carriers, (..., c, 6); velocities of fixed coordinates are
                 ignored.
             tensions: Tensions at the start, (..., m) [N]. They determine the unstrained lengths of elastic cables, and
-                the speeds of winches, which keep these tensions.
+                winches start at the speeds that keep these tensions.
             lengths: Unstrained lengths, (..., m) [m], instead of `tensions`; default: cables without tension at the
                 pose.
 

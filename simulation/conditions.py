@@ -24,7 +24,7 @@ class Conditions(Displayed):
         gusts: Intensity of Dryden turbulence, which is added to a constant wind [m/s].
         noise: Sensor noise, a `Noise` or a mapping (default: none).
         events: Events, each a line, a mapping, a YAML file with the list `events`, or an `Event` (times in [s], cables
-            count from 1): "cut 3 at 2.5", a cable breaks; "stick 2 at 1", a winch stops; "lose quad1 at 2", the
+            counted from 1): "cut 3 at 2.5", a cable breaks; "stick 2 at 1", a winch stops; "lose quad1 at 2", the
             actuators of a carrier stop; "miss 0.05 at 1.2", the controller does not respond; "carry 2.5 at 1", the
             platform carries a load [kg]; "stop at 3", the reference stops on its path as `control.stop` does; "follow
             next.nc at 3", another plan becomes the reference; "push 20 0 0 at 1 for 0.5", a force on the platform in

@@ -225,7 +225,7 @@ def occurrences(flight: SimulationData) -> list[Occurrence]:
         "error": (~(flight.error <= flight.tolerance)[:, None], lambda _: f"the error exceeded {within}"),
         "room": (
             flight.outside > LEAST,
-            lambda i: f"the platform went {sides[i]} (by up to {quantity(most[i], 'm')} later)",
+            lambda i: f"the platform went {sides[i]} (by {quantity(most[i], 'm')} at most)",
         ),
     }
     for kind, (where, words) in firsts.items():

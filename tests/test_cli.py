@@ -56,7 +56,8 @@ def test_robots_lists_and_diagnoses():
         assert name in listed.stdout
     printed = run("robots", "wang-flying-printed")
     assert "rank 3 of 6 at home (all cable lines meet in one point" in printed.stdout
-    assert "; highest rank near home: 3 if the platform is level, 5 if it is tilted\n" in printed.stdout
+    assert "; highest rank near home: 3 if the platform is level, 5 if it is tilted\n    cross the " in printed.stdout
+    assert "cross the cables" not in run("robots", "wang-ctmrts").stdout  # three cables are too few either way
     found = json.loads(run("robots", "wang-flying-printed", "--json").stdout)
     assert (found["rank"], found["rank_level"]) == (3, 3)
     assert json.loads(run("robots", "--schema").stdout)["title"] == "Robot"

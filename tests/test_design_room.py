@@ -105,6 +105,7 @@ def test_cables_keep_away_from_bodies_and_the_floor(tmp_path):
     steep = design(before, **wanted(before) | asked | {"keep_out": [{**SHELF, "cables": 3.0}]}, time_limit=0.1)
     assert steep.status == "not-found"
     assert "distance of 3 m between cables and shelf" in steep.report()
+    assert not steep.reasons.local_optimum
 
 
 def test_cables_of_different_carriers_are_apart_whatever_their_anchors_are():

@@ -120,7 +120,9 @@ def test_report_of_an_infeasible_plan_tells_the_certificate(impossible):
     assert number(told["Tensions", "smallest elsewhere"]) == pytest.approx(smallest, rel=1e-3)
     # Near singular poses the audit has the closest tensions, which are not feasible.
     closest = np.where(without[:, None], 1.0, impossible.audit.tensions)
-    near = facts(replace(impossible, audit=replace(impossible.audit, tensions=closest)))
+    singular = replace(impossible, audit=replace(impossible.audit, tensions=closest))
+    near = facts(singular)
+    assert cables_table(singular) == cables_table(impossible)
     assert near["Tensions", "no feasible tensions"] == fact
     assert near["Tensions", "smallest elsewhere"] == told["Tensions", "smallest elsewhere"]
     assert told["Carriers", "quad"] == "at rest"

@@ -1,4 +1,4 @@
-"""Compare bandwidths of computed torque under a push of 50 N; needs `winches.nc` of the page."""
+"""Compare bandwidths of computed torque under a push of 50 N; needs `winches.nc`, see README.md."""
 
 from towline import simulate
 from towline.control import ComputedTorque

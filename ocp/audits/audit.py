@@ -34,7 +34,7 @@ class Audit(Displayed):
     times: np.ndarray  # the dense grid, (n,)
     motion: Motion  # of the platform in {G}, at `times`
     carriers: Motion  # likewise
-    tensions: np.ndarray  # the audited ones, (n, m) [N], nan where none exist
+    tensions: np.ndarray  # the audited ones, (n, m) [N]; where none exist nan, or near singular poses the closest
     tensions_unlimited: np.ndarray  # those of least norm without limits, (n, m) [N]; negative: the cable would push
     # Distance of the required wrench from the available wrench set, (n,) [N], the largest from each time to the next;
     # rounding errors where tensions exist.

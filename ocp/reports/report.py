@@ -92,10 +92,9 @@ def cables_table(plan: PlanData) -> Table | None:
     moves = passed > 0  # phases meet at two instants of one time
     speeds = np.abs(np.diff(lengths, axis=0)[moves] / passed[moves, None]).max(axis=0)
     speeds[speeds < AT_REST] = 0.0
-    tensions = np.where(np.isfinite(audit.tensions), audit.tensions, np.nan)
-    known = np.asarray(np.isfinite(tensions).any(axis=0))
-    every = [lengths[0], lengths[-1], lengths.min(axis=0), lengths.max(axis=0), speeds]
-    every += [np.array([f(tensions[:, k]) if known[k] else np.nan for k in range(m)]) for f in (np.nanmin, np.nanmax)]
+    tensions = audit.tensions[_have_tensions(plan)]
+    extremes = (tensions.min(axis=0), tensions.max(axis=0)) if len(tensions) else (np.full(m, np.nan),) * 2
+    every = [lengths[0], lengths[-1], lengths.min(axis=0), lengths.max(axis=0), speeds, *extremes]
     written = zip(*(column(values.tolist()) for values in every), strict=True)
     rows = [(str(k + 1), *row) for k, row in enumerate(written)]
     lengths_are = ("initial length [m]", "final [m]", "shortest [m]", "longest [m]", "top speed [m/s]")
@@ -190,12 +189,19 @@ def _relaxation(plan: PlanData, relaxed: Relaxed) -> Fact:
     return f"feasible {relaxed.name}", fact
 
 
+def _have_tensions(plan: PlanData) -> np.ndarray:
+    """Return at which instants of the audit there are feasible tensions, (n,)."""
+    audit = plan.audit
+    exist = np.asarray(np.isfinite(audit.tensions).all(axis=1))
+    if plan.scenario.wind_set is None and not plan.scenario.phases.extremes:
+        exist &= audit.violation <= audit.tolerance  # near singular poses the tensions are the closest ones
+    return exist
+
+
 def _tensions(plan: PlanData) -> list[Fact]:
     robot, audit = plan.scenario.robot, plan.audit
     relaxed = bool(robot.t_min.any()) and any(phase.slack for phase in plan.scenario.phases.all)
-    exist = np.isfinite(audit.tensions).all(axis=1)
-    if plan.scenario.wind_set is None and not plan.scenario.phases.extremes:
-        exist &= audit.violation <= audit.tolerance  # near singular poses the tensions are the closest ones
+    exist = _have_tensions(plan)
     facts: list[Fact] = []
     if not exist.all():
         without = audit.times[~exist]

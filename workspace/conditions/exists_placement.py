@@ -28,8 +28,9 @@ LARGEST_STEP, SMALLEST_STEP = 0.5, 0.02  # of a box, or of all turns
 class ExistsPlacement(Condition):
     """A condition holds for the given carriers, or for another placement of the mobile ones in their reach boxes.
 
-    If the robot's drive is fixed-length, each carrier is placed at the length of its cable from the attachment. If it
-    is variable-length, mobile carriers keep their positions, and only attitudes are tried (`turn`).
+    If the robot's drive is fixed-length, only placements are tried in which the distance from each anchor to its
+    attachment is the length of the cable. If it is variable-length, mobile carriers keep their positions, and only
+    attitudes are tried (`turn`).
     """
 
     kind: Literal["exists-placement"] = "exists-placement"
