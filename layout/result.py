@@ -107,7 +107,8 @@ class Design(Drawn, Reported, Displayed):
     def _summary(self) -> str:
         if self.impossibility is not None:
             return "no layout inside the boxes meets the requirements"
-        text = f"capacity margin {quantity(self.margin, 'N')} (before {quantity(self.margin_before, 'N')})"
+        where = " in these" * (self.size_before is not None)
+        text = f"capacity margin{where} {quantity(self.margin, 'N')} (before {quantity(self.margin_before, 'N')})"
         if self.cost is not None and self.cost_before is not None:
             text = f"cost {quantity(self.cost)} (before {quantity(self.cost_before)}), {text}"
         if self.requirements.minimise == "t_max":
@@ -118,7 +119,7 @@ class Design(Drawn, Reported, Displayed):
         frequency = f"lowest natural frequency {now} (before {before})" if now else ""
         if self.size_before is not None:
             size, before = (f"{one:.2f} times" for one in (self.size, self.size_before))
-            text = f"boxes {size} as long and wide as required (before {before}), {text}"
+            text = f"boxes {size} as long, wide and high as required (before {before}), {text}"
         if self.requirements.maximise == "natural_frequency":
             text, frequency = f"{frequency}, {text}", ""
         text += f", {frequency}" * bool(frequency)

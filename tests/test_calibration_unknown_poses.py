@@ -74,7 +74,7 @@ def test_lengths_do_not_tell_the_size_of_a_robot_from_a_scale_of_all_readings():
     robot = load("planar-4")
     _, _, _, readings = a_log(robot, 0, 0.3, offsets=0.0, anchors=1e-3)
     said = str(calibrate(robot, Measurements(readings / 1.02), ("anchors",), outliers=False).report())
-    assert "the anchors are 1.8 % closer than in the file" in said
+    assert "the anchors are 1.8 % closer together than in the file" in said
     assert "with --free anchors,scales --prior anchors=0.02,scales=0.02 they include errors of both" in said
 
 

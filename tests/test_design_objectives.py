@@ -167,7 +167,7 @@ def test_a_layout_for_the_largest_boxes_keeps_the_margin_in_them():
     poses[:, :3] = rng.uniform(box.min, box.max, (300, 3))
     assert least_margin(found.robot, np.concatenate([corners(found.size), poses])) >= 10.0
     report = found.report()
-    assert f"boxes {found.size:.2f} times as long and wide as required" in report
+    assert f"boxes {found.size:.2f} times as long, wide and high as required" in report
     assert found.to_dict()["size"] == found.size
 
 

@@ -46,7 +46,7 @@ class Parameter(NamedTuple):
 
 def apart(growth: float) -> str:
     """Return how much farther apart anchors are, in per cent."""
-    return f"{quantity(100 * abs(growth), digits=2)} % {'farther apart' if growth > 0 else 'closer'}"
+    return f"{quantity(100 * abs(growth), digits=2)} % {'farther apart' if growth > 0 else 'closer together'}"
 
 
 @dataclass(frozen=True, eq=False)
