@@ -11,7 +11,7 @@ from .state import State
 
 
 class Pair(NamedTuple):
-    """Two bodies: the hull of some points, and that of others or, without others, a convex region that is fixed."""
+    """Two bodies: the hull of `points`, and the hull of `others`, or a fixed convex region if there are no `others`."""
 
     points: ca.SX  # (3, k) [m]
     others: ca.SX  # (3, j) [m], j = 0: a place

@@ -28,8 +28,8 @@ ROUNDING = 1e-3  # of a bound: a norm is rounded by so much at zero, where it ha
 class Hull(NamedTuple):
     """The only part of a motion on which a convex limit depends.
 
-    The values have to be a linear expression of it (of a `Magnitude` the vector, of an `Angle` the cosine up to 90
-    degrees), so that the convex hull of the Bernstein points bounds them over a whole interval. While such a limit is
+    The values have to be a linear expression of it (for a `Magnitude` the vector; for an `Angle` the cosine, up to
+    90 degrees), so that the convex hull of the Bernstein points bounds them over an interval. While such a limit is
     hard, the program imposes it only if the planner is free to choose one of the coordinates.
 
     Attributes:
@@ -64,7 +64,7 @@ class Limit(ABC):
         low, high: Bounds of each value; infinite: no bound.
         scale: Typical size in this unit: programs divide by it, and the audit's tolerance is proportional to it.
         soft: Excess that adds 1 to the objective, or None if the limit is hard. A task's `limits.soft` sets it by name.
-        hull: The part of the motion on which it depends, if it is convex: it then holds between the nodes too.
+        hull: The part of the motion on which a convex limit depends, so that it holds between the nodes too; else None.
         shown: True if figures and reports show it.
         per_metre: Largest change of a value while each point of the platform moves by at most one metre and all else is
             fixed; infinite if unknown, 1 for a distance. With it the planner proves that an obstacle blocks the way.

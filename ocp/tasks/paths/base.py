@@ -98,7 +98,7 @@ class PathBase(Part):
         return np.zeros(0)
 
     def pieces(self, duration: float) -> np.ndarray:
-        """Return when pieces of the motion begin and end that may show nowhere else, (n, 2) [s]."""
+        """Return the beginning and the end of each leg, which may be too short for a time grid to show, (n, 2) [s]."""
         return np.zeros((0, 2))
 
     def stations(self, duration: float) -> Stations:
