@@ -41,15 +41,23 @@ class Pending:
 
         What was not commanded is zero.
         """
+        edges = self._time - ago + part * np.arange(parts + 1)
+        first, last = float(edges[0]), float(edges[-1])
         begins: list[float] = []
         values: list[bytes] = []
         for begin, command in reversed(self._commands):
-            begins.append(begin)
-            values.append(command)
-            if begin <= self._time - ago:  # those before are over
+            if begin < last:
+                begins.insert(0, begin)
+                values.insert(0, command)
+            if begin <= first:  # those before are over
                 break
         if not begins:
             return np.zeros((parts, self._count))
-        low = self._time - ago + part * np.arange(parts)[:, None]
-        overlap = np.minimum([self._time, *begins[:-1]], low + part) - np.maximum(begins, low)
-        return np.maximum(overlap, 0.0) @ np.frombuffer(b"".join(values)).reshape(len(begins), -1) / part
+        starts, commands = np.array(begins), np.frombuffer(b"".join(values)).reshape(len(begins), -1)
+        # Integrals at the beginnings are added one after the other, since BLAS rounds those of a robot differently
+        # depending on how many there are.
+        integrals = np.zeros_like(commands)
+        np.cumsum((starts[1:] - starts[:-1])[:, None] * commands[:-1], axis=0, out=integrals[1:])
+        at = np.maximum(starts.searchsorted(edges, side="right") - 1, 0)
+        reached = integrals[at] + np.maximum(edges - starts[at], 0.0)[:, None] * commands[at]
+        return (reached[1:] - reached[:-1]) / part

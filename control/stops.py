@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from ..base.errors import InputError
 from ..base.inputs import number
-from ..statics.stops import Stop, beginnings, longest_stop_along, stop_along
+from ..statics.stop_result import Stop
+from ..statics.stops import beginnings, longest_stop_along, stop_along
 from .planned_references import planned
 from .trajectory import HasTrajectory
 

@@ -29,7 +29,7 @@ from .warnings.slipped_units import slipped_units
 from .warnings.weak_formation import weak_formation
 
 if TYPE_CHECKING:
-    from ..statics.stops import Stop
+    from ..statics.stop_result import Stop
     from .audits.robust_margin import RobustMargin
     from .timing.fastest_law import FastestLaw
 

@@ -88,6 +88,18 @@ def test_a_stop_is_nearly_as_short_as_linear_programs_permit():
     assert took - step <= stop(found, time).duration <= 1.1 * took + 0.03
 
 
+def test_no_robot_stops_later_for_stronger_cables():
+    """They pull far harder than the plan did, which an audit must not take for a wrench that they do not give."""
+    cables = [((x, 0, z), (0.3 * x, 0, 0.3 * (1 - z))) for x, z in ((-1, 2), (1, 2), (1, 0), (-1, 0))]
+    platform = {"mass": 1, "inertia": [0.02] * 3 + [0] * 3, "dof": ["x", "z", "pitch"], "home": [0, 0, 1, 0, 0, 0]}
+    way = {"path": {"kind": "line", "start": [-0.2, 0, 1], "end": [0.2, 0, 1.1]}, "duration": 1}
+    robots = [framed(cables, platform, t_min=1, t_max=most) for most in (50, 300)]
+    weak, strong = (stop(plan(robot, way), 0.5) for robot in robots)
+    assert weak.feasible
+    assert strong.feasible
+    assert strong.duration <= weak.duration < 0.04
+
+
 def test_no_stop_takes_longer_than_the_longest(made):
     _, found = made
     longest = longest_stop(found, 0.1)

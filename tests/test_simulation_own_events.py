@@ -11,6 +11,7 @@ import pytest
 
 from towline import InputError, load, plan, simulate
 from towline.control import ComputedTorque, OpenLoop, Predictive, references
+from towline.control.command_delay import Pending
 from towline.control.trajectory import read_trajectory
 from towline.models import Dynamics
 from towline.simulation import Cut, Event, Follow, Push, Wall
@@ -192,6 +193,30 @@ def test_many_runs_are_pushed_as_one_is(robot):
     run = simulate(robot, robot.home, duration=0.2, events=events)
     runs = simulate(robot, robot.home, duration=0.2, events=events, runs=3)
     np.testing.assert_allclose(runs["error_max"].values, run.error.max(), rtol=1e-9)
+
+
+def test_what_acts_on_a_run_is_the_same_to_the_bit_however_many_are_side_by_side():
+    """How many are depends on the time that they take, but the same seed has to give the same bits."""
+    random, wall = np.random.default_rng(0), Wall(at=0, point=(0.1, 0, 0), normal=(1, 2, 3), stiffness=1e3, damping=10)
+    motions = random.normal(size=(40, 1, 12))
+    alone = [wall.wrench(0.0, motions[[row]])[0] for row in range(40)]
+    np.testing.assert_array_equal(wall.wrench(0.0, motions), alone)
+
+    def means(commands, parts):  # of (K, N) commands, one every 2 ms, from 31 ms ago on
+        queue = Pending(0.5)
+        queue.reset(commands.shape[1])
+        for command in commands:
+            queue.add(command.tobytes())
+            queue.wait(0.002)
+        return queue.means(0.031, parts, 0.03 / parts)
+
+    commands = random.normal(size=(30, 40))
+    for parts in (1, 7):
+        alone = [means(np.ascontiguousarray(commands[:, [row]]), parts)[:, 0] for row in range(40)]
+        np.testing.assert_array_equal(means(commands, parts).T, alone)
+    last = commands[14:30]  # the first of which is held for 1 ms more, and the last until 1 ms ago
+    durations = np.r_[0.001, np.full(14, 0.002), 0.001]
+    np.testing.assert_allclose(means(commands, 1)[0], durations @ last / 0.03, rtol=1e-12)
 
 
 def test_runs_with_events_resume(robot, tmp_path):

@@ -15,7 +15,8 @@ from ...base.text import quantity
 from ...models.part import PositiveRange
 from ...models.rigid_load import RigidLoad
 from ...models.trajectory import Motion, Trajectory
-from ...statics.stops import Stop, beginnings, longest_stop_along
+from ...statics.stop_result import Stop
+from ...statics.stops import beginnings, longest_stop_along
 from ..audits.audit import audit
 from ..audits.excess import Excess
 from ..plan import Plan
