@@ -47,7 +47,7 @@ class Report(Displayed):
     parts: Sequence[Part]  # sections, tables and sentences, in order
     drawings: Callable[[], Iterable[Drawing]] = tuple  # draws the figures of the page
     folded: Sequence[str] = ()  # titles of the parts that the page folds, below the others
-    files: Sequence[tuple[str, str]] = ()  # title and text of each file that the page has
+    files: Sequence[tuple[str, Callable[[], str]]] = ()  # title of each file in the page, and what returns its text
 
     @property
     def headline(self) -> str:
@@ -88,7 +88,7 @@ class Report(Displayed):
             else:
                 inside = "\n".join([page.heading(title), *(page.paragraph(fact) for _, fact in part.facts)])
             (folded if hidden else shown).append(page.fold(name, inside) if hidden else inside)
-        folded += [page.fold(title, page.verbatim(text)) for title, text in self.files]
+        folded += [page.fold(title, page.verbatim(write())) for title, write in self.files]
         parts = page.beside([*shown, *folded], [page.picture(drawing) for drawing in self.drawings()])
         word, colour = self.status or "result", style.colour(COLOURS.get(self.status, OTHER))
         return page.page(self.about, word, self.summary, colour, parts)

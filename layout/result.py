@@ -170,7 +170,7 @@ class Design(Drawn, Reported, Displayed):
             pair, pose = self.judgement.closest
             facts.append(("too close", f"{numbered('cable', pair)} at the pose ({quantity_row(pose)}) [m, rad]"))
         why = [] if self.reasons is None else self._why(self.reasons)
-        files = [("The robot's file", to_yaml(self.robot))]
+        files = [("The robot's file", lambda: to_yaml(self.robot))]
         if (found := self.reasons) is not None:  # whether the layout can be improved
             state = "a local optimum: no small change improves it" if found.local_optimum else "not yet a local optimum"
             count, several = found.at_bounds or "no", found.at_bounds > 1

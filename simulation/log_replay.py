@@ -204,7 +204,7 @@ class Replay(Drawn, Reported, Displayed):
             summary=self._summary(),
             parts=[Section("", self._facts()), self._residual_table(), *explanations, *self.notes],
             drawings=self._drawings,
-            files=[("The robot's file", to_yaml(robot))],
+            files=[("The robot's file", lambda: to_yaml(robot))],
         )
 
     def _summary(self) -> str:

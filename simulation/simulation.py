@@ -138,7 +138,7 @@ class Simulation(SimulationData, MotionResult, Reported):
             summary="; ".join(self.failures) or largest,
             parts=[Section("", self._facts())],
             drawings=self._drawings,
-            files=[("The robot's file", to_yaml(self.robot))],
+            files=[("The robot's file", lambda: to_yaml(self.robot))],
         )
 
     def _facts(self) -> list[Fact]:

@@ -47,7 +47,7 @@ def report(result: CalibrationData, drawings: Callable[[], Iterable[Drawing]] = 
         summary,
         parts,
         drawings,
-        files=[("The robot's file", to_yaml(result.robot))],
+        files=[("The robot's file", lambda: to_yaml(result.robot))],
     )
 
 

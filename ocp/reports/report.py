@@ -134,8 +134,8 @@ def report(plan: PlanData, drawings: Callable[[], Iterable[Drawing]] = tuple) ->
         drawings=drawings,
         folded=("Audit", "Computation", "Stages"),
         files=[
-            ("The robot's file", to_yaml(robot)),
-            ("Complete task, defaults included (frame: world is {G})", to_yaml(task.in_file())),
+            ("The robot's file", lambda: to_yaml(robot)),
+            ("Complete task, defaults included (frame: world is {G})", lambda: to_yaml(task.in_file())),
         ],
     )
 
