@@ -8,6 +8,9 @@ import pytest
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
+import towline
+
+from .test_ocp_formation import bodies
 from .warm import run
 
 ROOT = Path(__file__).parent.parent
@@ -47,9 +50,16 @@ def passes(found):
     rim = radius * np.stack([np.cos(angle), np.sin(angle), np.zeros(73)], axis=1)
     turned = Rotation.from_euler("ZYX", quads[..., 5:2:-1].reshape(-1, 3)).as_matrix().reshape(*quads.shape[:2], 3, 3)
     rims = quads[:, :, None, :3] + np.einsum("ncij,pj->ncpi", turned, rim)
-    beyond = np.stack([np.abs(rims[..., 0]) - 0.2, 0.9 - np.abs(rims[..., 1])], axis=-1)
-    outside = np.where((beyond > 0).all(axis=-1), np.linalg.norm(beyond, axis=-1), beyond.max(axis=-1))
-    assert outside.min() >= 0.05 - 1e-5
+    robot = towline.load("multi-quadrotor-4")
+    platform, cables = bodies(robot, load, quads)
+    for points in (rims, platform, cables):
+        beyond = np.stack([np.abs(points[..., 0]) - 0.2, 0.9 - np.abs(points[..., 1])], axis=-1)
+        outside = np.where((beyond > 0).all(axis=-1), np.linalg.norm(beyond, axis=-1), beyond.max(axis=-1))
+        assert outside.min() >= 0.05 - 1e-5
+    lengths = np.linalg.norm(cables[:, :, -1] - cables[:, :, 0], axis=-1)
+    np.testing.assert_allclose(lengths, np.broadcast_to(robot.fixed_lengths, lengths.shape), atol=1e-4)
+    assert (robot.t_min - 1e-6 <= found.tensions.values).all()
+    assert (found.tensions.values <= robot.t_max + 1e-6).all()
     apart = np.linalg.norm(quads[:, :, None, :3] - quads[:, None, :, :3], axis=3) + 9 * np.eye(4)
     assert apart.min() >= 2 * radius + 0.05 - 1e-5
     assert np.ptp(quads[0, :, 1]) > 1.6  # and wide again, before and after

@@ -4,7 +4,6 @@ import time
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from towline.models import load
 from towline.ocp import plan
@@ -121,22 +120,3 @@ def test_a_time_limit_ends_a_search():
         assert found.audit.excess or found.audit.violation.max() > found.audit.tolerance  # of the best attempt
     assert took[1] < 1.0 + 2 * took[0]
     assert found.reason in replace(found, offers=Offers).report()  # what is offered takes three times as long
-
-
-def test_quadrotors_go_through_a_slot():
-    robot = load("multi-quadrotor-3")
-    there = {"kind": "waypoints", "shape": "spline", "points": [[-3, 0, 0], [3, 0, 0]]}
-    found = plan(robot, there_and_back(path=there, duration=8, steps=16))
-    assert found.feasible, found.report()
-    seen = found.audit
-    platform, cables = bodies(robot, seen.motion.pose, seen.carriers.pose)
-    assert from_walls(platform).min() >= KEPT["platform"] - 1e-5
-    assert from_walls(cables).min() >= KEPT["cables"] - 1e-5
-    assert from_walls(seen.carriers.pose[..., :3]).min() >= KEPT["carriers"] - 1e-5
-    lengths = np.linalg.norm(cables[:, :, -1] - cables[:, :, 0], axis=-1)
-    np.testing.assert_allclose(lengths, np.broadcast_to(robot.fixed_lengths, lengths.shape), atol=1e-4)
-    x = seen.motion.pose[:, 0]
-    assert x[0] == pytest.approx(-3, abs=1e-9)
-    assert x[-1] == pytest.approx(3, abs=1e-9)
-    assert robot.t_min.min() - 1e-6 <= seen.tensions.min()
-    assert seen.tensions.max() <= robot.t_max.max() + 1e-6
