@@ -41,7 +41,7 @@ class Extremes:
         self._over_time = np.full((flights, PARTS, 3), np.nan, dtype="f4")
         room = room_of(robot)
         self._room, self._outside = room if room and room.is_known else None, np.zeros(flights)
-        self._least, self._most = np.full((flights, robot.m), np.inf), np.full((flights, robot.m), -np.inf)
+        self._least, self._most = np.full(flights, np.inf), np.full((flights, robot.m), -np.inf)
 
     def take(self, period: Period) -> None:
         """Keep a period."""
@@ -56,18 +56,20 @@ class Extremes:
         if self._room is not None:
             beyond = self._room.beyond(period.motions[rows, 0, :6]).max(axis=1)
             self._outside[rows] = np.fmax(self._outside[rows], beyond)
-        whole, taut = ~self._cut[period.number], self._taut[period.number]
+        cut, taut = self._cut[period.number], self._taut[period.number]
+        whole = ~cut if cut.any() else True  # a mask takes longer
         if command.released is not None:
             kept = ~np.broadcast_to(np.asarray(command.released, dtype=bool), period.tensions.shape)
             self._kept = kept if self._kept is None else self._kept & kept
         if self._kept is not None:
             whole, taut = whole & self._kept[rows], taut & self._kept[rows]
-        self._least[rows] = np.minimum(self._least[rows], tensions, where=whole, out=self._least[rows])
         self._most[rows] = np.maximum(self._most[rows], tensions, where=whole, out=self._most[rows])
         least = tensions.min(axis=1, where=whole, initial=np.inf)
         most = tensions.max(axis=1, where=whole, initial=-np.inf)
+        self._least[rows] = np.minimum(self._least[rows], least)
         part = period.number * PARTS // len(self._references)
-        self._over_time[rows, part] = np.fmax(self._over_time[rows, part], np.stack([square, -least, most], axis=1))
+        for k, each in enumerate((square, -least, most)):
+            self._over_time[rows, part, k] = np.fmax(self._over_time[rows, part, k], each)
         if not tensions.min() > 0:
             self._slack[rows] += ((tensions <= 0) & taut).any(axis=1)
         answered = np.atleast_1d(command.answered)[rows]
@@ -82,7 +84,7 @@ class Extremes:
         result["lasted"], result["slack"], result["answered"] = lasted, self._slack, self._answers
         result["error_rms"] = np.sqrt(self._squares / np.maximum(lasted, 1))
         result["error_max"], result["outside"] = np.sqrt(self._largest), self._outside
-        for name, each in (("tension_min", self._least.min(axis=1)), ("tension_max", self._most.max(axis=1))):
+        for name, each in (("tension_min", self._least), ("tension_max", self._most.max(axis=1))):
             result[name] = np.where(np.isinf(each), 0.0, each)
         # Of fewer periods than parts, some have none and keep the values before.
         filled = np.unique(np.arange(len(self._references)) * PARTS // len(self._references))
