@@ -115,7 +115,7 @@ class LengthControl(Controller):
         noise = None if sensors is None else noise_of(sensors)
         self._delay, self._longest = (0.0, 0.0) if noise is None else (noise.delay, 2 * age_of(noise) - noise.delay)
         self._gains = LengthGains(self.robot, self.stiffness, self._damping, self._lag, noise)
-        self.corrects = any(self._gains_for(PERIOD, self._longest))
+        self.corrects = bool(self._gains_for(PERIOD, np.array(self._longest)).any())
         if None in self._given and not self.corrects:
             least = quantity(float(self._damping.min()), "N s/m")
             warn(
@@ -134,8 +134,10 @@ class LengthControl(Controller):
         self._period = np.inf  # of the references [s], inf: unknown
         self._winches, self._sent = Lag(self._lag), np.zeros(0)  # and their lengths without corrections, (..., m)
         self._strain: np.ndarray | None = None  # commanded at the last step, (..., m)
-        self._pose, self._held = np.zeros(0), 0.0  # last measured, and the time since it changed [s]
-        self._unseen, self._oldest = 0.0, self._longest  # time without a pose, and the largest age [s]
+        self._pose = np.zeros(0)  # last measured, (..., 6)
+        self._held = self._unseen = self._oldest = np.zeros(0)  # as `_age_of` has them, (...) [s]
+        self._seen = np.zeros(0, dtype=int)  # status at the last pose that was used, (...)
+        self._blind = np.zeros(0)  # time since then, (...) [s]; inf: there was none, or it is too old
         self._past: list[tuple[float, Motion]] = []  # times and references of earlier steps
         self._errors: tuple[np.ndarray, ...] = ()  # of pose and of speeds of the cables, at the last step
 
@@ -166,8 +168,9 @@ class LengthControl(Controller):
     def step(self, time: float, state: State, reference: Reference) -> Command:
         """Return the lengths for the time from `time` [s] on, with the planned tensions and motion of the carriers.
 
-        The correction needs the pose of the state, and with a lag its velocity; without these, the last one stays.
-        A state is compared with the plan at its time; a pose that is older than 1 s is treated as missing.
+        The correction needs the pose of the state, and with a lag its velocity; without these, the last one stays, and
+        from 0.2 s on the status is "hold". A state is compared with the plan at its time; a pose that is older than 1 s
+        is treated as missing, with the status "hold" at once.
 
         Raises:
             InputError: If an argument has a wrong shape or value, the lengths of the reference overflow, or no tensions
@@ -195,32 +198,48 @@ class LengthControl(Controller):
         given, lead = self._winches.value, _lead(self._lag, period)
         self._sent = given + lead / period * (far / (1.0 + strain) - given)
         planned = self._planned_at(float(time) - age, float(time), reference)
-        if age > MEMORY:  # the plan of its time is forgotten
-            state = state._replace(pose=np.full_like(state.pose, np.nan))
+        forgotten = age > MEMORY  # the plan of its time
+        state = state._replace(pose=np.where(forgotten[..., None], np.nan, state.pose))
+        self._blind = np.where(forgotten, np.inf, self._blind + dt)
         corrected, status = self._correction(dt, period, lead - period, planned, state, reference)
         lengths, self._strain, self._time = self._sent + corrected, strain, float(time)
         command = planned_command(self.robot, reference, rows)
         return command._replace(answered=status, lengths=np.broadcast_to(lengths, command.tensions.shape))
 
-    def _age_of(self, age: float | None, dt: float, state: State) -> float:
-        """Return the age of the measured pose [s], estimated if it is None, and remember the largest one."""
-        known, old = np.isfinite(state.pose), self._pose if self._pose.shape == state.pose.shape else np.nan
+    def _age_of(self, age: float | None, dt: float, state: State) -> np.ndarray:
+        """Return the ages of the measured poses, (...) [s], estimated if `age` is None, and remember the largest ones.
+
+        Each robot of a batch has its own time since its pose changed, and since one was measured.
+        """
+        if self._pose.shape != state.pose.shape:
+            self._pose, self._held = np.full_like(state.pose, np.nan), np.zeros(state.pose.shape[:-1])
+            self._unseen, self._oldest = np.zeros_like(self._held), np.full_like(self._held, self._longest)
+            self._seen, self._blind = np.full(self._held.shape, HOLD), np.full_like(self._held, np.inf)
+            self._past = []
+        known, old = np.isfinite(state.pose), self._pose
         pose = np.where(known, state.pose, old)
-        self._held = min(self._held + dt, HELD) if np.array_equal(pose, old, equal_nan=True) else 0.0
-        self._pose, self._unseen = pose, 0.0 if known.all(axis=-1).any() else self._unseen + dt
+        stays = ((pose == old) | np.isnan(pose)).all(axis=-1)
+        self._held = np.where(stays, np.minimum(self._held + dt, HELD), 0.0)
+        self._pose, self._unseen = pose, np.where(known.all(axis=-1), 0.0, self._unseen + dt)
         # A robot at rest has the same pose for long, which is no reason for smaller gains.
         largest = self._unseen + (self._longest if age is None else age)
-        self._oldest = max(largest, self._oldest * float(np.exp(-dt / MEMORY)), self._longest)
-        return self._delay + self._held if age is None else age
+        self._oldest = np.maximum(np.maximum(largest, self._oldest * np.exp(-dt / MEMORY)), self._longest)
+        return self._delay + self._held if age is None else np.full_like(self._held, age)
 
-    def _planned_at(self, measured: float, time: float, reference: Reference) -> Motion:
-        """Return the reference of the platform at the time at which a pose was measured [s], and remember this one."""
-        pose, velocity, acceleration = (np.array(part) for part in reference[:3])
+    def _planned_at(self, measured: np.ndarray, time: float, reference: Reference) -> Motion:
+        """Return the reference of the platform at the times of measured poses, (...) [s], and remember this one."""
+        shape = (*measured.shape, 6)
+        pose, velocity, acceleration = (np.array(np.broadcast_to(part, shape)) for part in reference[:3])
         self._past.append((time, (pose, velocity, acceleration)))
-        while len(self._past) > 1 and self._past[1][0] <= max(measured, time - MEMORY):
+        while len(self._past) > 1 and self._past[1][0] <= max(float(measured.min()), time - MEMORY):
             self._past.pop(0)
-        at, motion = self._past[0]
-        return moved_on(motion, measured - at)
+        at = np.searchsorted([begins for begins, _ in self._past[1:]], measured, side="right")
+        if (at == at.flat[0]).all():
+            begins, motion = self._past[int(at.flat[0])]
+            return moved_on(motion, (measured - begins)[..., None])
+        motions = [np.stack([self._past[k][1][part][row] for row, k in enumerate(at)]) for part in range(3)]
+        since = measured - np.array([self._past[k][0] for k in at])
+        return moved_on((motions[0], motions[1], motions[2]), since[:, None])
 
     def _tensions_of(self, reference: Reference) -> np.ndarray:
         """Return the planned tensions, (..., m) [N]; they may jump, and are not extrapolated."""
@@ -268,14 +287,20 @@ class LengthControl(Controller):
             wanted = proportional * lead * behind - (A.swapaxes(-1, -2) @ ahead[..., None])[..., 0]
         beyond = np.asarray(~(np.abs(wanted) <= self._most).all(axis=-1))
         self._sum = np.where(beyond[..., None], before, total)
-        status = np.where(self._deviation.are_far(state.pose, pose, between), OFF, PLANNED)
-        status = np.where(beyond | ~known, HOLD, status).astype(np.int8)
+        far = self._deviation.are_far(state.pose, pose, between)
+        self._seen = np.where(known, np.where(far, OFF, PLANNED), self._seen)
+        self._blind = np.where(known, 0.0, self._blind)
+        status = np.where(beyond | (self._blind > HELD), HOLD, self._seen).astype(np.int8)
         return np.clip(np.nan_to_num(wanted), -self._most, self._most), status
 
-    def _gains_for(self, dt: float, age: float) -> list[float]:
-        """Return P and I [1/s], given or by default, for a pose of an age [s] and steps of `dt` [s]."""
-        usual = self._gains.at(dt, age) if None in self._given else (0.0, 0.0)
-        return [other if own is None else own for own, other in zip(self._given, usual, strict=True)]
+    def _gains_for(self, dt: float, ages: np.ndarray) -> np.ndarray:
+        """Return P and I [1/s], given or by default, (2, ..., 1), for poses of ages (...) [s] and steps of `dt` [s]."""
+        gains = np.empty((2, *ages.shape, 1))
+        for age in set(ages.ravel().tolist()):
+            usual = self._gains.at(dt, age) if None in self._given else (0.0, 0.0)
+            for gain, own, other in zip(gains, self._given, usual, strict=True):
+                gain[ages == age] = other if own is None else own
+        return gains
 
 
 def _lead(lag: float, period: float) -> float:

@@ -169,9 +169,11 @@ def test_without_a_pose_or_with_an_old_one_the_last_correction_stays(model, moti
     still = np.zeros(6), model.carrier_home, np.zeros_like(model.carrier_home)
     first = controller.step(0.0, State(reference.pose + 1e-3 * np.eye(6)[2], *still), reference)
     assert first.answered == PLANNED
-    lost = controller.step(0.1, State(np.full(6, missing), *still, time=measured), reference)
-    assert lost.answered == HOLD
-    np.testing.assert_allclose(wound(lost), wound(first))
+    for time, answered in ((0.1, PLANNED if measured is None else HOLD), (0.21, HOLD)):
+        lost = controller.step(time, State(np.full(6, missing), *still, time=measured), reference)
+        assert lost.answered == answered
+        np.testing.assert_allclose(wound(lost), wound(first))
+    assert controller.step(0.3, State(reference.pose, *still), reference).answered == PLANNED
 
 
 def test_rows_are_as_alone(model, motion):
@@ -189,16 +191,18 @@ def test_rows_are_as_alone(model, motion):
             assert one.answered == both.answered[row]
 
 
-def test_a_robot_without_a_pose_does_not_change_the_others(model, motion):
-    """Poses that are held tell their age, also beside a robot of which none is measured."""
-    both, alone = LengthControl(model), LengthControl(model)
+def test_robots_of_a_batch_have_poses_of_their_own_ages(model, motion):
+    """Poses that are held tell their age, also beside robots whose poses changed at other times, or that have none."""
+    together, alone = LengthControl(model), [LengthControl(model) for _ in range(4)]
     still = np.zeros(6), model.carrier_home, np.zeros_like(model.carrier_home)
-    wanted = references(motion, 0.02)[:20]
+    wanted = references(motion, 0.02)[:30]
     for k, reference in enumerate(wanted):
-        pose = wanted[k - k % 5].pose
-        rows = State(np.stack([pose, np.full(6, np.nan)]), *(np.stack([one, one]) for one in still))
-        one = alone.step(0.02 * k, State(pose, *still), reference)
-        np.testing.assert_allclose(wound(both.step(0.02 * k, rows, reference))[0], wound(one), rtol=1e-13)
+        poses = [wanted[max(k - (k + row) % 5, 0)].pose for row in range(3)] + [np.full(6, np.nan)]
+        both = together.step(0.02 * k, State(np.stack(poses), *(np.stack([one] * 4) for one in still)), reference)
+        for row, controller in enumerate(alone):
+            one = controller.step(0.02 * k, State(poses[row], *still), reference)
+            np.testing.assert_allclose(wound(both)[row], wound(one), rtol=1e-13)
+            assert both.answered[row] == one.answered
 
 
 def test_angles_are_compared_round_the_circle(model):
