@@ -478,6 +478,9 @@ def test_carriers_that_are_too_weak_for_the_weight_have_the_factor_with_which_th
     found = plan(Robot.model_validate(data), task)
     assert found.status == "infeasible"
     factor = float(advice(found, "a larger thrust_max").split()[0])
+    held = plan(Robot.model_validate(data), {"path": {"kind": "rest", "pose": [0, 0, 0]}, "duration": 1})
+    assert advice(held, "a larger thrust_max") == advice(found, "a larger thrust_max")
+    assert "moving carriers" not in held.report()  # they would not help
     for carrier in data["carriers"]:
         carrier["thrust_max"] *= factor
     assert plan(Robot.model_validate(data), task).feasible

@@ -8,8 +8,8 @@ import numpy as np
 from ...base.display import Fact
 from ...base.text import quantity, quantity_row
 from ...models.carriers import TILT
-from ..audits.excess import TENSIONS
-from ..proofs.too_heavy import OF_WEIGHT
+from ..audits.excess import TENSIONS, Excess
+from ..proofs.too_heavy import OF_WEIGHT, too_heavy
 from ..result import PlanData
 from ..tasks.scenario import ATTITUDE
 from ..tasks.wind_set import WindBox, WindDisc
@@ -59,9 +59,9 @@ def _directions(plan: PlanData) -> list[Fact]:
 def _carriers(plan: PlanData) -> list[Fact]:
     """Suggest moving carriers, or else a tilting platform, if the task forbids them and no tensions exist."""
     robot, task = plan.scenario.robot, plan.scenario.task
-    if not _lacks_tensions(plan):
+    if not _lacks_tensions(plan) or _too_weak(plan):
         return []
-    if task.base.kind == "hold" and any(carrier.free_coordinates(robot.drive) for carrier in robot.carriers):
+    if _holds(plan):
         return [("moving carriers", "`base: {kind: free}`: the planner then chooses how the carriers move")]
     if task.base.kind == "free" and not task.tube.turn and robot.dof_mask[ATTITUDE].any():
         turn = "tilt" if robot.dof_mask[list(TILT)].any() else "turn"
@@ -70,15 +70,30 @@ def _carriers(plan: PlanData) -> list[Fact]:
     return []
 
 
+def _holds(plan: PlanData) -> bool:
+    """Return whether the task holds carriers that could move."""
+    robot = plan.scenario.robot
+    return plan.scenario.task.base.kind == "hold" and any(each.free_coordinates(robot.drive) for each in robot.carriers)
+
+
+def _too_weak(plan: PlanData) -> list[Excess]:
+    """Return the limits that are too small for the weight, even if carriers that the task holds moved."""
+    audit = plan.audit
+    if not _holds(plan):
+        return [excess for excess in audit.excess if excess.limit in OF_WEIGHT]
+    ends = [(audit.motion.velocity[k], *audit.carriers.velocity[k]) for k in (0, -1)]
+    return list(too_heavy(plan.scenario, np.array([[not part.any() for part in end] for end in ends])))
+
+
 def _strength(plan: PlanData) -> list[Fact]:
     """Return how much stronger what is too weak for the weight must be."""
-    for excess in plan.audit.excess:
-        if excess.limit in OF_WEIGHT:
-            least = excess.bound / excess.value
-            larger, enough = (quantity(times, digits=3) for times in (TO_MOVE * least, least))
-            why = f"{enough} times would carry the weight at rest, but tilt and acceleration need more"
-            return [(f"a larger {excess.limit}", f"{larger} times as large; {why}")]
-    return []
+    facts = []
+    for excess in _too_weak(plan):
+        least = excess.bound / excess.value
+        larger, enough = (quantity(times, digits=3) for times in (TO_MOVE * least, least))
+        why = f"{enough} times would carry the weight at rest, but tilt and acceleration need more"
+        facts.append((f"a larger {excess.limit}", f"{larger} times as large; {why}"))
+    return facts
 
 
 def _wind(plan: PlanData) -> list[Fact]:
