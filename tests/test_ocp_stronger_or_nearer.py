@@ -469,6 +469,14 @@ def test_numbers_in_another_unit_come_first_and_nothing_else_is_tried():
     assert "no single change" not in found.report()
 
 
+def test_a_geometry_that_cannot_balance_a_moment_is_what_must_change():
+    """All cables end in a point beside the CoM: no tensions give a moment about it."""
+    still = {"path": {"kind": "rest", "pose": [0, 0, 2]}, "duration": 1}
+    found = plan(with_cables("cogiro", attachment=[0.3, 0, 0]), still)
+    assert found.certificate.singular
+    assert "platform.dof" in advice(found, "another geometry")
+
+
 def test_carriers_that_are_too_weak_for_the_weight_have_the_factor_with_which_they_are_not():
     data = load("multi-quadrotor-3").model_dump()
     for carrier in data["carriers"]:

@@ -23,6 +23,7 @@ FELT = 0.02  # of the weight: a wind with less force is hardly why tensions are 
 
 def ideas(plan: PlanData) -> list[Fact]:
     """Return what may help, the most likely first; empty for a feasible plan, or if nothing is known to."""
+    robot = plan.scenario.robot
     if plan.feasible:
         return []
     more = [("more", "other changes may be feasible: the search for changes was cut short")] * plan.cut_short
@@ -32,6 +33,10 @@ def ideas(plan: PlanData) -> list[Fact]:
     found += _frame(plan)
     tried = "shorter line, weaker wind, lighter platform or load, stronger cables or lower t_min"
     nothing = [("no single change", f"of those tried makes it feasible: no duration, limit, {tried}")]
+    if plan.certificate is not None and plan.certificate.singular and robot.m >= len(robot.platform.dof):
+        nothing.append(
+            ("another geometry", "cables that cross, or `platform.dof` with only what the cables can control")
+        )
     return found + more or (nothing if _lacks_tensions(plan) and not units(plan) else [])
 
 
