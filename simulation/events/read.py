@@ -27,7 +27,7 @@ def read_events(robot: Robot, events: Sequence[Any], name: str = "events") -> li
     """Return events, the earliest first, each with its place in the argument.
 
     Args:
-        robot: The robot. In lines and files its cables count from 1, and its carriers are named.
+        robot: The robot. In lines and files its cables are numbered from 1, and its carriers are named.
         events: Each a line such as "cut 3 at 2.5" (times in [s]), a mapping with a `kind` or such a mapping in JSON,
             the YAML file of a list `events` of these, or an `Event`.
         name: Name of the argument, for errors.
