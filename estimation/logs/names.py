@@ -1,6 +1,7 @@
 """The usual names of what robots record: `role` of a field, and the units of each role."""
 
 import re
+from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
 
@@ -173,6 +174,7 @@ class Role(NamedTuple):
     unit: str = ""
 
 
+@lru_cache(maxsize=1024)  # each name of a recording is looked up for each role that fields may have
 def role(name: str, stated: str = "") -> Role | None:
     """Return the role of a field, with its topic's name before it, or None if the name is not a usual one.
 
