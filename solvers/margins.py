@@ -32,7 +32,9 @@ class Reserves(NamedTuple):
     pull: np.ndarray  # (K, m), of each cable along the normal
 
 
-def margins(A: np.ndarray, w: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -> np.ndarray:
+def margins(
+    A: np.ndarray, w: np.ndarray, t_min: np.ndarray, t_max: np.ndarray, every: np.ndarray | None = None
+) -> np.ndarray:
     """Return signed distances of wrenches from the boundary of the available wrench set, (N,) [N].
 
     Inside, they are positive and equal to `capacity_margin`, also for a flat set. Outside, they are negative bounds:
@@ -41,8 +43,23 @@ def margins(A: np.ndarray, w: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) 
     - `A`: (N, n, m), rows of one unit [N per N].
     - `w`: required wrenches, (N, n), or one for all, (n,) [N].
     - `t_min`, `t_max`: finite limits, (m,) each [N].
+    - `every`: filled with what `all_reserves` returns, (N, K) [N].
     """
-    return _margins(A, w, t_min, t_max)
+    _, n, m = A.shape
+    result = np.full(len(A), np.nan)
+    if len(A) and n <= m and n <= ROWS and m <= MARGIN_CABLES and (t_min < t_max).all():
+        core.margins(np.ascontiguousarray(A), np.ascontiguousarray(w), t_min, t_max, result, every)
+    unsure = np.flatnonzero(np.isnan(result))
+    result[unsure] = -np.inf
+    real = unsure[np.isfinite(A[unsure]).all(axis=(1, 2))]
+    if real.size:
+        result[real], along, full = _by_facets(A[real], w if w.ndim == 1 else w[real], t_min, t_max)
+        if every is not None:
+            every[real] = np.inf
+            every[real, 0] = result[real]
+            if along.shape[1] == every.shape[1]:
+                every[real[full]] = along[full]
+    return result
 
 
 def all_reserves(A: np.ndarray, w: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -> np.ndarray:
@@ -54,7 +71,7 @@ def all_reserves(A: np.ndarray, w: np.ndarray, t_min: np.ndarray, t_max: np.ndar
     """
     _, n, m = A.shape
     found = np.full((len(A), comb(m, n - 1)), np.inf)
-    _margins(A, w, t_min, t_max, found)
+    margins(A, w, t_min, t_max, found)
     return found
 
 
@@ -90,27 +107,6 @@ def reserves(A: np.ndarray, w: np.ndarray, t_min: np.ndarray, t_max: np.ndarray,
 def subsets_inside(n: int, m: int) -> np.ndarray:
     """Return the columns inside each facet, (K, n - 1)."""
     return np.array(list(combinations(range(m), n - 1)), dtype=np.intp).reshape(comb(m, n - 1), n - 1)
-
-
-def _margins(
-    A: np.ndarray, w: np.ndarray, t_min: np.ndarray, t_max: np.ndarray, every: np.ndarray | None = None
-) -> np.ndarray:
-    """Return the margins, and put the reserves into `every`."""
-    _, n, m = A.shape
-    result = np.full(len(A), np.nan)
-    if len(A) and n <= m and n <= ROWS and m <= MARGIN_CABLES and (t_min < t_max).all():
-        core.margins(np.ascontiguousarray(A), np.ascontiguousarray(w), t_min, t_max, result, every)
-    unsure = np.flatnonzero(np.isnan(result))
-    result[unsure] = -np.inf
-    real = unsure[np.isfinite(A[unsure]).all(axis=(1, 2))]
-    if real.size:
-        result[real], along, full = _by_facets(A[real], w if w.ndim == 1 else w[real], t_min, t_max)
-        if every is not None:
-            every[real] = np.inf
-            every[real, 0] = result[real]
-            if along.shape[1] == every.shape[1]:
-                every[real[full]] = along[full]
-    return result
 
 
 def _by_facets(
