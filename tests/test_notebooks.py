@@ -58,8 +58,10 @@ def test_a_notebook_runs_and_says_the_same(path, kernel, tmp_path):
     shown = [out for cell in code(stored) for out in cell.outputs]
     assert {out.output_type for out in shown} <= {"stream", "display_data", "execute_result"}
     assert any("image/png" in out.get("data", {}) for out in shown)
-    # It begins without the names of the notebook before, in a folder of its own.
-    fresh.cells.insert(0, nbformat.v4.new_code_cell(f"%reset -f\n%cd -q {tmp_path}"))
+    # It begins without the names of the notebook before, in a folder of its own. Figures are drawn once, not a second
+    # time for their margins.
+    once = "%matplotlib inline\n%config InlineBackend.print_figure_kwargs = {'bbox_inches': None}"
+    fresh.cells.insert(0, nbformat.v4.new_code_cell(f"%reset -f\n%cd -q {tmp_path}\n{once}"))
     NotebookClient(fresh, km=kernel, timeout=MOST_SECONDS).execute()
     words, numbers = verdicts(stored)
     assert words
