@@ -26,10 +26,10 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
     the result is the stop with the smallest missing wrench, with its certificate. The time to compute it depends on
     how long the robot takes to stop, not on the plan.
 
-    Carriers that fly, each with one cable of fixed length, leave their path: each moves so that its cable has the
-    direction of the required force, which changes as little as possible (`statics.team_stops`). If each flying carrier
-    has several cables of fixed length that begin at one point of it, and all cables together give every wrench, that
-    point stays on its path.
+    Carriers that fly, each with one cable, leave their path: each moves so that its cable has the direction of the
+    required force, which changes as little as possible (`statics.team_stops`). If all cables together give every
+    wrench, flying carriers stay on their paths and tilt. Those with cables of fixed length, which must begin at one
+    point of a carrier, keep the path of that point. Winches make up for tilts with the lengths of their cables.
 
     Args:
         plan: A `Plan`, another object with such a `trajectory`, such a dataset, or the NetCDF file of one.

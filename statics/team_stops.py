@@ -8,24 +8,23 @@ the cables on it change with the wrench by the least amount,
 so each carrier is where its cable has the direction of its force. If carriers hold several cables, and the cables give
 every wrench, tensions change instead, by A^+ (w - w_plan), and the carriers stay on their paths. Their acceleration,
 tilt and efforts follow. They, and the tensions, bound how soon the platform can rest: of some durations, the shortest
-that keeps all limits is taken.
+that keeps all limits is taken. Lengths that winches change are those of the plan where carriers hold one cable each;
+otherwise they follow from tilted carriers.
 """
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.text import quantity
 from ..models import points
-from ..models.carriers import Actuator
 from ..models.dynamics import dynamics_of
-from ..models.part import inertia_matrix
 from ..models.robot import Robot
 from ..models.trajectory import Motion, Trajectory
 from .continuation import RESTS, before, continued, faded, slopes
+from .team_limits import carriers_of, limits_of, pull_of, worst_of
+from .winch_forces import forces_of_winches, has_winches
 
 SHORTEST, LONGEST = 0.1, 10.0  # the shortest stop [s], and the longest one over a usual one
 ATTEMPTS, USUAL = 8, 2.5  # durations that are tried, all at once, and a usual one, of sqrt(length / g)
@@ -33,18 +32,15 @@ CLOSE = 1.5  # times the least excess: of stops that break limits, the shortest 
 LEAST = 1.7  # times that carriers need at their largest acceleration: the rate falls up to 2.2 times its mean
 COARSE, FINE, APART = 24, 150, 0.01  # instants of an attempt, and at most of the result; [s] between those, at least
 SMOOTHED = 0.03  # [s], over which tilt is smoothed: a plan's jerk jumps between its nodes
-ACCEPTED = 2e-3  # of a limit's range, up to which differences are inexact
 LONGER, AGAIN = 1.03, 3  # at least, and how often: what broke a limit in between takes longer
 TINY, RANK = 1e-12, 1e-9  # of a matrix
 TILTS = 3  # times that positions are computed from tilts, which follow from accelerations
-LACKING = 0.01  # of the largest tension: a force that no actuator gives
 INSTANT = 1e-4  # [s], for differences of attitudes
 MOST_FADING = 4.0, 20.0  # derivatives of log(tension) at the end of a plan [1/s, 1/s^2]: larger ones are noise
 SLACK = 1e-4  # of the largest tension: smallest tension at the end of a plan
 # Of s = t / duration, with three continuous derivatives, and with five, since anchors that turn need two more.
 RATE = np.polynomial.Polynomial([1, 0, 0, 0, -35, 84, -70, 20])
 SMOOTHER = np.polynomial.Polynomial([1, 0, 0, 0, 0, 0, -462, 1980, -3465, 3080, -1386, 252])
-Row = tuple[str, np.ndarray, float, float]  # a limit: name, values (d, n), and their range
 
 
 class TeamStop(NamedTuple):
@@ -64,25 +60,25 @@ def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Team
 
     A plan that ends at rest is followed to its end if no stop is shorter.
 
-    Raises `InputError` if the robot is no team of flying carriers with a cable of fixed length each, or with cables of
-    fixed length that begin at one point of each and give every wrench at home.
+    Raises `InputError` if the flying carriers of the robot have several cables that do not give every wrench at home,
+    or several of fixed length that begin at different points of a carrier.
     """
-    flying = [carrier.body is not None and bool(carrier.actuators) for carrier in robot.carriers]
-    if not all(flying) or robot.fixed_lengths is None or not (_have_one_each(robot) or _give_every_wrench(robot)):
+    if not (_have_one_each(robot) or _give_every_wrench(robot)):
         raise InputError(
-            "a stop must be of a team whose carriers fly with one cable of fixed length each, or with cables from one "
-            "point of each that give every wrench, or of a robot with carriers of kind ground, prescribed or mobile, "
-            f"got {robot.name!r}"
+            "a stop must be of a robot whose flying carriers have one cable each, or cables that give every wrench, of "
+            f"fixed length only if those of a carrier begin at one point, got {robot.name!r}"
         )
 
-    end, trajectory = trajectory.duration or 0.0, continued(trajectory, together=True)
+    fly = len(carriers_of(robot).flying) == len(robot.carriers)
+    end, trajectory = trajectory.duration or 0.0, continued(trajectory, together=fly)
     last = [motion[1] for motion in trajectory.at(np.array([end]))]
     rests = max(np.abs(velocity).max() for velocity in last) < RESTS
     left = end - begins if rests else np.inf
     speeds = np.linalg.norm(trajectory.at(np.array([begins]))[1][1][0, :, :3], axis=1)
     braking = speeds / [carrier.motion_limits.acceleration or np.inf for carrier in robot.carriers]  # [s]
     soonest = max(SHORTEST, LEAST * float(braking.max()))
-    usual = USUAL * np.sqrt(robot.fixed_lengths.max() / np.linalg.norm(robot.gravity))
+    longest_cable = dynamics_of(robot).cable_lengths(robot.home, robot.carrier_home).max()
+    usual = USUAL * np.sqrt(longest_cable / np.linalg.norm(robot.gravity))
     longest = min(LONGEST * max(usual, soonest), max(2 * left, soonest))
     durations = np.geomspace(soonest, longest, ATTEMPTS)
     durations, best = durations[durations < left], None
@@ -101,15 +97,18 @@ def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Team
 
 
 def _have_one_each(robot: Robot) -> bool:
-    return sorted(robot.carrier_of_cable) == list(range(len(robot.carriers)))
+    """Return whether all carriers fly, with one cable each."""
+    each = list(range(len(robot.carriers)))
+    return sorted(robot.carrier_of_cable) == each == carriers_of(robot).flying.tolist()
 
 
 def _give_every_wrench(robot: Robot) -> bool:
-    """Return whether cables from one point of each carrier give every wrench, so that carriers may keep their paths."""
-    own = _carriers_of(robot).anchors[robot.carrier_of_cable]
+    """Return whether the cables give every wrench, and let flying carriers tilt while these keep their paths."""
     A = robot.wrench_scale[:, None] * dynamics_of(robot).wrench_matrix(robot.home, robot.carrier_home)
     rows = np.flatnonzero(robot.dof_mask)
-    return bool((robot.anchors == own).all() and np.linalg.matrix_rank(A[rows], RANK) == len(rows))
+    own = carriers_of(robot).anchors[robot.carrier_of_cable]
+    tilt = robot.fixed_lengths is None or bool((robot.anchors == own).all())
+    return tilt and bool(np.linalg.matrix_rank(A[rows], RANK) == len(rows))
 
 
 def _remainder(robot: Robot, trajectory: Trajectory, begins: float) -> TeamStop:
@@ -124,41 +123,24 @@ def _remainder(robot: Robot, trajectory: Trajectory, begins: float) -> TeamStop:
         for t in (-INSTANT, 0.0, INSTANT)
     )
     turning = R, (after - before) / (2 * INSTANT), (after - 2 * R + before) / INSTANT**2
-    rows = _limits(robot, motion, forces[None], tensions[None], turning)  # type: ignore[arg-type]
-    return TeamStop(times, begins + times, platform, carriers, tensions, *_worst(rows, times[None])[0])
+    windings = _windings(robot, times[None], platform[0][None], pose, tensions[None])
+    rows = limits_of(robot, motion, forces[None], tensions[None], turning, windings)  # type: ignore[arg-type]
+    return TeamStop(times, begins + times, platform, carriers, tensions, *worst_of(rows, times[None])[0])
 
 
-class _Carriers(NamedTuple):
-    """Constants of the carriers of a team, one row a carrier."""
+def _windings(
+    robot: Robot, times: np.ndarray, platform: np.ndarray, carriers: np.ndarray, tensions: np.ndarray
+) -> np.ndarray | None:
+    """Return the forces of the motors of winches, (d, n, m) [N]; None if the file describes none.
 
-    first: np.ndarray  # (c,), of its cables
-    holds: np.ndarray  # (c, m), 1 for each of its cables
-    anchors: np.ndarray  # (c, 3), where its cables begin, in its frame [m]
-    mass: np.ndarray  # (c, 1) [kg]
-    inertia: np.ndarray  # (c, 3, 3) [kg m^2]
-    actuators: list[tuple[Actuator, ...]]
-    commands: list[np.ndarray]  # (6, k), the commands of each unit wrench
-
-
-@lru_cache(maxsize=4)
-def _carriers_of(robot: Robot) -> _Carriers:
-    holds = np.arange(len(robot.carriers))[:, None] == robot.carrier_of_cable
-    bodies = [carrier.body for carrier in robot.carriers if carrier.body is not None]
-    actuators = [carrier.actuators for carrier in robot.carriers]
-    return _Carriers(
-        first=(first := holds.argmax(axis=1)),
-        holds=holds.astype(float),
-        anchors=robot.anchors[first],
-        mass=np.array([[body.mass] for body in bodies]),
-        inertia=np.array([inertia_matrix(body.inertia) for body in bodies]),
-        actuators=actuators,
-        commands=[np.linalg.pinv([actuator.wrench for actuator in each]) for each in actuators],
-    )
-
-
-def _pull(robot: Robot, forces: np.ndarray) -> np.ndarray:
-    """Return the pull of the cables of each carrier, (d, n, c, 3) [N], from their forces on the platform."""
-    return -(_carriers_of(robot).holds @ forces)
+    - `times`: (d, n) [s].
+    - `platform`, `carriers`: poses, (d, n, 6) and (d, n, c, 6).
+    - `tensions`: (d, n, m) [N].
+    """
+    if not has_winches(robot):
+        return None
+    lengths = dynamics_of(robot).cable_lengths(platform, carriers)
+    return np.stack([forces_of_winches(robot, *each) for each in zip(times, lengths, tensions, strict=True)])
 
 
 def _least(square: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -183,52 +165,68 @@ class _Stops:
         (pose, velocity, acceleration), self.planned = flat
         platform = pose, r * velocity, r**2 * acceleration + u * velocity
         after = self.tau.ravel() - (trajectory.duration or 0.0)
-        forces, tensions, balance = _forces(robot, trajectory, r[:, 0], platform, flat[0], self.planned, after)
+        self._given = trajectory, r[:, 0], platform, flat[0], self.planned, after
         self.platform = [part.reshape(*shape, 6) for part in platform]
-        self.tensions = tensions.reshape(*shape, -1)
-        self._forces, self._before = (part.reshape(*shape, robot.m, 3) for part in (forces, balance))
-        of_cables = dynamics_of(robot).cable_lengths
-        lengths = of_cables(pose, self.planned[0])
-        if (after > 0).any():  # the plan's last ones
-            lengths[after > 0] = of_cables(
-                *(motion[0] for motion in trajectory.at(np.array([trajectory.duration or 0.0])))
-            )
-        lengths = r * lengths + (1.0 - r) * np.array(robot.fixed_lengths)
-        ends = points.attachments(robot, pose) + (lengths / tensions)[..., None] * forces
-        self._ends = ends.reshape(self._forces.shape)  # of cables on carriers
+        self._before = self._balance()
+        lengths = dynamics_of(robot).cable_lengths(pose, self.planned[0])
+        if robot.fixed_lengths is not None:
+            if (after > 0).any():  # the plan's last ones
+                ends = trajectory.at(np.array([trajectory.duration or 0.0]))
+                lengths[after > 0] = dynamics_of(robot).cable_lengths(*(motion[0] for motion in ends))
+            lengths = r * lengths + (1.0 - r) * np.array(robot.fixed_lengths)
+        along = (lengths.reshape(self.tensions.shape) / self.tensions)[..., None] * self._forces
+        self._ends = points.attachments(robot, pose).reshape(along.shape) + along  # of cables on carriers
         self.carriers = self._motions()
         R = points.rotations(self.carriers[0][..., 3:])
         turning = R, self._slope(R), self._slope(self._slope(R))
-        rows = _limits(robot, self.carriers, self._forces, self.tensions, turning, limits_lacking=True)
-        self.worst = _worst(rows, self.times, begins_inside=False)
+        windings = _windings(robot, self.times, self.platform[0], self.carriers[0], self.tensions)
+        rows = limits_of(robot, self.carriers, self._forces, self.tensions, turning, windings, limits_lacking=True)
+        self.worst = worst_of(rows, self.times, begins_inside=False)
+
+    def _balance(self, carriers: np.ndarray | None = None) -> np.ndarray:
+        """Find forces and tensions, with carriers (d, n, c, 6), or those of the plan; return the plan's forces."""
+        forces, tensions, balance = _forces(self.robot, *self._given, carriers)
+        self.tensions = tensions.reshape(*self.tau.shape, -1)
+        self._forces, balance = (part.reshape(*self.tau.shape, self.robot.m, 3) for part in (forces, balance))
+        return balance
 
     def _motions(self) -> Motion:
         """Return pose, velocity and acceleration of the carriers, (d, n, c, 6) each."""
-        its, turns = _carriers_of(self.robot), bool(self.robot.anchors.any())
+        its, turns = carriers_of(self.robot), bool(self.robot.anchors.any())
+        flying, keep = its.flying, self.robot.fixed_lengths is None and not _have_one_each(self.robot)
         planned = [part.reshape(*self.tau.shape, -1, 6) for part in self.planned]
         pose, starts = planned[0].copy(), [part[0] for part in self.planned]
         # The stop begins with the plan's own tilt, which between the plan's nodes is not quite that of balance.
         usual = self._tilts(planned[2], self._before)
         for attempt in range(TILTS if turns else 1):
-            pose[..., :3] = self._ends[:, :, its.first]
-            if turns:
-                pose[..., :3] -= (points.rotations(pose[..., 3:]) @ its.anchors[..., None])[..., 0]
+            if not keep:
+                places = self._ends[:, :, its.first[flying]]
+                if turns:
+                    arms = its.anchors[flying][..., None]
+                    places -= (points.rotations(pose[:, :, flying, 3:]) @ arms)[..., 0]
+                pose[:, :, flying, :3] = places
             if attempt == TILTS - 1:
                 break
             bend = self._slopes(pose[..., :3], [part[:, :3] for part in starts])[1]
             share = self.rate[..., None, None]
             change = self._tilts(bend, self._forces) - share * usual
-            pose[..., 3:5] = share * planned[0][..., 3:5] + self._smooth(change, lands=turns)
+            tilts = share * planned[0][:, :, flying, 3:5] + self._smooth(change, lands=turns)
+            pose[:, :, flying, 3:5] = tilts
+            if keep and turns:
+                self._balance(pose)
         pose[:, 0] = starts[0]
         return pose, *self._slopes(pose, starts)
 
     def _tilts(self, bends: np.ndarray, forces: np.ndarray) -> np.ndarray:
-        """Return roll and pitch, (d, n, c, 2) [rad], that balance accelerations of carriers and forces of cables."""
-        bends, pulls = (part.reshape(self.tau.size, -1, part.shape[-1]) for part in (bends, _pull(self.robot, forces)))
-        gravity = np.array(self.robot.gravity)
-        tilts = np.empty((*bends.shape[:2], 2))
-        for k, carrier in enumerate(self.robot.carriers):
-            tilts[:, k] = carrier.balanced_tilt(self.planned[0][:, k], bends[:, k], pulls[:, k], gravity)
+        """Return roll and pitch of the k flying carriers, (d, n, k, 2) [rad], that balance accelerations and cables."""
+        bends, pulls = (
+            part.reshape(self.tau.size, -1, part.shape[-1]) for part in (bends, pull_of(self.robot, forces))
+        )
+        flying, gravity = carriers_of(self.robot).flying, np.array(self.robot.gravity)
+        tilts = np.empty((self.tau.size, len(flying), 2))
+        for row, k in enumerate(flying):
+            carrier = self.robot.carriers[k]
+            tilts[:, row] = carrier.balanced_tilt(self.planned[0][:, k], bends[:, k], pulls[:, k], gravity)
         return tilts.reshape(*self.tau.shape, -1, 2)
 
     def _slopes(self, values: np.ndarray, starts: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -267,11 +265,13 @@ def _forces(
     planned: Motion,
     carriers: Motion,
     after: np.ndarray,
+    tilted: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the forces of the cables on the platform, (n, m, 3), the tensions, (n, m), and the plan's forces [N].
 
     `kept`, (n,), is the share of the plan's imbalance that remains, and `after`, (n,) [s], the time after the plan's
     end, from which its tensions fade to constants: those that balance an extrapolated motion can be negative.
+    `tilted` has the poses of the carriers, (..., c, 6), if these are not those of the plan, `carriers`.
     """
     rows = np.flatnonzero(robot.dof_mask)
     scale = robot.wrench_scale[rows]
@@ -283,18 +283,19 @@ def _forces(
         rates = [np.clip(rate, -most, most) for rate, most in zip(rates, MOST_FADING, strict=True)]
         tensions = np.where(beyond, np.exp(faded((value, *rates), np.maximum(after, 0.0))[0]), tensions)
         missing = np.where(beyond, last[2][2:], missing)
+    of_plan = A[:, :3].swapaxes(1, 2) * tensions[..., None]
+    if tilted is not None:
+        A = dynamics_of(robot).wrench_matrix(planned[0], tilted.reshape(carriers[0].shape))
     now = dynamics_of(robot).required_wrench(*platform, wind=trajectory.wind)
     wanted = scale * (now - (A @ tensions[..., None])[..., 0] - kept[:, None] * missing)[:, rows]
     may_turn = _have_one_each(robot)
     G = scale[:, None] * (_wrenches_of_forces(robot, planned[0]) if may_turn else A)[:, rows]
     turned = G.swapaxes(1, 2)
     change = (turned @ _least(G @ turned, wanted[..., None]))[..., 0]
-    directions = A[:, :3].swapaxes(1, 2)
-    of_plan = directions * tensions[..., None]
     if may_turn:
         forces = of_plan + change.reshape(of_plan.shape)
         return forces, np.linalg.norm(forces, axis=2), of_plan
-    return directions * (tensions + change)[..., None], tensions + change, of_plan
+    return A[:, :3].swapaxes(1, 2) * (tensions + change)[..., None], tensions + change, of_plan
 
 
 def _of_plan(
@@ -324,66 +325,3 @@ def _wrenches_of_forces(robot: Robot, pose: np.ndarray) -> np.ndarray:
     turn[..., :3, :] = np.eye(3)
     turn[..., 3:, :] = points.cross(arms.swapaxes(-1, -2), np.eye(3)).swapaxes(-1, -2)
     return turn.swapaxes(1, 2).reshape(len(pose), 6, -1)
-
-
-def _worst(rows: list[Row], times: np.ndarray, begins_inside: bool = True) -> list[tuple[float, str]]:
-    """Return the largest excess of each stop, relative to a limit's range, and the text of that limit.
-
-    Unless a stop should begin inside, so much as it has first is no excess. What is undefined is infinitely much.
-    """
-    names, values = [row[0] for row in rows], np.stack([row[1] for row in rows])  # (k, d, n)
-    low, high = np.array([row[2:] for row in rows]).T[..., None, None]  # (k, 1, 1) each
-    floor = low if begins_inside else np.minimum(low, values[..., :1])
-    ceiling = high if begins_inside else np.maximum(high, values[..., :1])
-    beyond = np.where(np.isnan(values), np.inf, np.maximum(floor - values, values - ceiling) / (high - low))
-    worst = [(0.0, "")] * len(times)
-    for d, excess in enumerate(beyond.max(axis=(0, 2)).tolist()):
-        if excess > ACCEPTED:
-            k, at = np.unravel_index(np.argmax(beyond[:, d]), beyond[:, d].shape)
-            value = values[k, d, at]
-            bound = float(low[k, 0, 0] if value < low[k, 0, 0] else high[k, 0, 0])
-            worst[d] = excess, f"{names[k]}: {quantity(value)} of {bound:g} at {quantity(times[d, at], 's')}"
-    return worst
-
-
-def _limits(
-    robot: Robot,
-    motion: Motion,
-    forces: np.ndarray,
-    tensions: np.ndarray,
-    turning: tuple[np.ndarray, np.ndarray, np.ndarray],
-    limits_lacking: bool = False,
-) -> list[Row]:
-    """Return what a motion of the carriers, (d, n, c, 6) each, requires, and the tensions, (d, n, m) [N].
-
-    `forces` are those of the cables on the platform, (d, n, m, 3) [N].
-    `turning` has their rotations and the first and second derivative of these, (d, n, c, 3, 3) each. If
-    `limits_lacking`, a carrier that turns about another point than its anchor has a limit for the force that is missing
-    from its actuators: it can turn too quickly for its cables to stay taut.
-    """
-    its, (_, velocity, acceleration), R, pull = _carriers_of(robot), motion, turning[0], _pull(robot, forces)
-    down = R.swapaxes(-1, -2)
-    spin, spun = (points.axial(down @ part) for part in turning[1:])
-    force = (down @ (its.mass * (acceleration[..., :3] - np.array(robot.gravity)) - pull)[..., None])[..., 0]
-    impulse, change = ((its.inertia @ part[..., None])[..., 0] for part in (spin, spun))
-    moment = change + points.cross(spin, impulse) - points.cross(its.anchors, (down @ pull[..., None])[..., 0])
-    wrenches = np.concatenate([force, moment], axis=-1)
-    speeds, bends = (np.linalg.norm(part[..., :3], axis=-1) for part in (velocity, acceleration))
-    tilts, ranges = np.arccos(np.clip(R[..., 2, 2], -1, 1)), zip(robot.t_min, robot.t_max, strict=True)
-    rows = [(f"tension {i + 1}", tensions[..., i], low, high) for i, (low, high) in enumerate(ranges)]
-    for k, carrier in enumerate(robot.carriers):
-        wrench, name, own = wrenches[:, :, k], carrier.name, carrier.motion_limits
-        commands = wrench @ its.commands[k]
-        rows += [(f"{a.name} of {name}", commands[..., i], a.low, a.high) for i, a in enumerate(its.actuators[k])]
-        if limits_lacking and its.anchors[k].any():
-            given = commands @ np.array([a.wrench for a in its.actuators[k]])
-            lacking = np.linalg.norm((wrench - given)[..., :3], axis=-1)
-            most = max(robot.t_min[its.first[k]], LACKING * robot.t_max[its.first[k]])
-            rows.append((f"force perpendicular to the thrust of {name}", lacking, 0.0, most))
-        for what, values, largest in (
-            ("speed", speeds, own.speed),
-            ("acceleration", bends, own.acceleration),
-            ("tilt", tilts, own.tilt),
-        ):
-            rows += [] if largest is None else [(f"{what} of {name}", values[..., k], 0.0, largest)]
-    return rows

@@ -44,13 +44,22 @@ def shares_of_winches(robot: Robot, trajectory: Trajectory, tau: np.ndarray) -> 
     return inertia * v / largest, inertia * g / largest
 
 
+def largest_forces(robot: Robot) -> list[float]:
+    """Return the largest force of the motor of each winch, (m,) [N]; infinity without a winch in the file."""
+    return _winches(robot)[1].tolist()
+
+
+def forces_of_winches(robot: Robot, times: np.ndarray, lengths: np.ndarray, tensions: np.ndarray) -> np.ndarray:
+    """Return the sizes of the forces of motors, (n, m) [N], that pull with tensions and accelerate their winches."""
+    acceleration = np.gradient(np.gradient(lengths, times, axis=0), times, axis=0)
+    return np.abs(tensions - _winches(robot)[0] * acceleration)
+
+
 def overloaded_winch(robot: Robot, times: np.ndarray, lengths: np.ndarray, tensions: np.ndarray) -> str:
     """Return which winch needs the largest force beyond its motor's, to pull with tensions and to be accelerated."""
     if not has_winches(robot):
         return ""
-    inertia, most = _winches(robot)
-    acceleration = np.gradient(np.gradient(lengths, times, axis=0), times, axis=0)
-    force = np.abs(tensions - inertia * acceleration)
+    most, force = _winches(robot)[1], forces_of_winches(robot, times, lengths, tensions)
     row, cable = np.unravel_index(int(np.argmax(force - most)), force.shape)
     if force[row, cable] <= most[cable] * (1 + OF_FORCE):
         return ""

@@ -337,14 +337,6 @@ def test_the_wind_of_a_plan_acts_on_its_stop(tmp_path):
     assert np.abs(given - dynamics.required_wrench(*its.platform)).max() > 0.01  # which the wind makes
 
 
-def test_flying_carriers_are_refused():
-    found = plan(
-        "wang-flying-quadrotor", {"path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 1, "base": {"kind": "free"}}
-    )
-    with pytest.raises(InputError, match="carriers of kind ground, prescribed or mobile, got 'wang-flying-quadrotor'"):
-        stop(found, 0.5)
-
-
 def test_a_swinging_load_on_one_cable_follows_its_plan_to_the_end():
     """The cable has the direction of the planned acceleration less gravity, so no other rate balances the load."""
     limits = {"reach": {"min": [-9] * 3, "max": [9] * 3}, "speed_max": 9, "acceleration_max": 90}

@@ -254,9 +254,65 @@ def test_a_team_with_more_cables_than_it_needs_keeps_the_tensions_of_its_plan():
     np.testing.assert_allclose(its.tensions, np.tile(tensions, (len(its.times), 1)), atol=1e-6)
 
 
+def with_winches(name):
+    """Return a ring of six cables below one quadrotor, three quadrotors with a winch each, or one and the ground."""
+    data = load("multi-quadrotor-3" if name == "team" else "wang-flying-quadrotor").model_dump(mode="json")
+    if name == "team":
+        winch = {"inertia": 0.2, "friction": 0.1, "speed_max": 3, "force_max": 80}
+        data |= {"drive": "both", "cables": [each | {"length": None, "winch": winch} for each in data["cables"]]}
+    if name == "tied":
+        tied = {"carrier": "ground", "anchor": [3, 0, -3], "attachment": [0, 0, -0.05]}
+        data["carriers"].append({"name": "ground", "kind": "ground"})
+        data["cables"].append(data["cables"][0] | tied)
+    return Robot.model_validate(data | {"name": name})
+
+
+@pytest.mark.parametrize("name", ["ring", "team", "tied"])
+def test_stops_of_flying_carriers_with_winches_obey_the_equations_of_motion(name):
+    robot = with_winches(name)
+    dynamics, g, start = Dynamics(robot), np.array(robot.gravity), robot.home[:3]
+    path = {"kind": "line", "start": start.tolist(), "end": (start + np.array([0.9, 0.3, 0.1])).tolist()}
+    found = plan(robot, {"path": path, "duration": 1.5, "base": {"kind": "free"}, "margin": 0.2, "steps": 15})
+    assert found.feasible
+    way = np.stack([each.pose[:3] for each in references(found, 1e-3)])
+    for time in (0.1, 0.7, 1.2):
+        its = stop(found, time)
+        assert its.feasible
+        assert its.duration <= found.duration - time + 1e-9
+        assert np.linalg.norm(its.platform[0][:, None, :3] - way, axis=2).min(axis=1).max() < 2e-3
+        A = dynamics.wrench_matrix(its.platform[0], its.carriers[0])
+        missing = dynamics.required_wrench(*its.platform) - (A @ its.tensions[..., None])[..., 0]
+        assert np.abs(missing * robot.wrench_scale).max() < 1e-4 * robot.weight
+        assert (its.tensions > 0.9 * robot.t_min).all()
+        directions, R = -A[:, :3].swapaxes(1, 2), points.rotations(its.carriers[0][..., 3:])
+        for k, carrier in enumerate(robot.carriers):
+            mine, (pose, velocity, acceleration) = robot.carrier_of_cable == k, (part[:, k] for part in its.carriers)
+            inside = slice(2, -2)  # the differences of which are of second order
+            rate = np.gradient(pose, its.times, axis=0)
+            np.testing.assert_allclose(rate[inside], velocity[inside], atol=0.02 * (1 + np.abs(velocity).max()))
+            if not carrier.actuators:
+                np.testing.assert_array_equal(pose, np.tile(pose[0], (len(pose), 1)))
+                continue
+            pulls = its.tensions[:, mine, None] * directions[:, mine]
+            force = carrier.mass * (acceleration[:, :3] - g) - pulls.sum(axis=1)
+            along = (R[:, k, :, 2] * force).sum(axis=1)
+            assert (along < carrier.thrust_max).all()
+            assert np.linalg.norm(force - along[:, None] * R[:, k, :, 2], axis=1).max() < 0.02 * along.max()
+    run = simulate(robot, found, ComputedTorque(robot), duration=1.2 + its.duration + 0.3, events=["stop at 1.2"])
+    assert run.passed
+    assert run.error.max() < 2e-3
+
+
 def test_what_is_no_such_team_is_refused_in_one_line():
-    line = {"path": {"kind": "line", "start": [0, 0, 0], "end": [0.1, 0, 0]}, "duration": 2.0}
-    robot = load("wang-flying-quadrotor")
-    with pytest.raises(InputError, match=r"with one cable of fixed length each, .* got 'wang-flying-quad") as error:
-        stop(plan(robot, line), 1.0)
+    data = load("wang-flying-quadrotor").model_dump(mode="json")
+    robot = Robot.model_validate(data | {"cables": data["cables"][:5]})
+
+    def at(times):
+        poses = [np.repeat(each[None], len(times), axis=0) for each in (robot.home, robot.carrier_home)]
+        return tuple((pose, 0 * pose, 0 * pose) for pose in poses)
+
+    with pytest.raises(
+        InputError, match=r"have one cable each, or cables that give every .* got 'wang-flying-q"
+    ) as error:
+        team_stop_along(robot, Trajectory(1.0, at), 0.5)
     assert "\n" not in str(error.value)

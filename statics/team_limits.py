@@ -1,0 +1,144 @@
+"""What a motion of flying carriers requires of their actuators, cables and winches: `limits_of`, `worst_of`."""
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.text import quantity
+from ..models import points
+from ..models.carriers import Actuator, RigidBody
+from ..models.part import inertia_matrix
+from ..models.robot import Robot
+from ..models.trajectory import Motion
+from .winch_forces import largest_forces
+
+ACCEPTED = 2e-3  # of a limit's range, up to which differences are inexact
+SLACKER, ROUNDING = 0.1, 1e-6  # of a cable's smallest tension, and of its range: what it may lack
+LACKING = 0.01  # of the largest tension: a force that no actuator gives
+
+
+class Row(NamedTuple):
+    """A limit: its name, values (d, n) and their range, and the accepted excess as a share of it."""
+
+    name: str
+    values: np.ndarray
+    low: float
+    high: float
+    accepted: float = ACCEPTED
+
+
+class Carriers(NamedTuple):
+    """Constants of the carriers of a team, one row a carrier; those that do not fly have no mass and no actuators."""
+
+    flying: np.ndarray  # (k,), the indices of those that fly
+    first: np.ndarray  # (c,), of its cables
+    holds: np.ndarray  # (c, m), 1 for each of its cables
+    anchors: np.ndarray  # (c, 3), where its cables begin, in its frame [m]
+    mass: np.ndarray  # (c, 1) [kg]
+    inertia: np.ndarray  # (c, 3, 3) [kg m^2]
+    actuators: list[tuple[Actuator, ...]]
+    commands: list[np.ndarray]  # (6, k), the commands of each unit wrench
+
+
+@lru_cache(maxsize=4)
+def carriers_of(robot: Robot) -> Carriers:
+    """Return the constants of a robot's carriers."""
+    holds = np.arange(len(robot.carriers))[:, None] == robot.carrier_of_cable
+    bodies = [carrier.body or RigidBody(0.0, (0.0,) * 6) for carrier in robot.carriers]
+    actuators = [carrier.actuators for carrier in robot.carriers]
+    return Carriers(
+        flying=np.flatnonzero([bool(each) for each in actuators]),
+        first=(first := holds.argmax(axis=1)),
+        holds=holds.astype(float),
+        anchors=robot.anchors[first],
+        mass=np.array([[body.mass] for body in bodies]),
+        inertia=np.array([inertia_matrix(body.inertia) for body in bodies]),
+        actuators=actuators,
+        commands=[np.linalg.pinv(np.reshape([actuator.wrench for actuator in each], (-1, 6))) for each in actuators],
+    )
+
+
+def pull_of(robot: Robot, forces: np.ndarray) -> np.ndarray:
+    """Return the pull of the cables of each carrier, (d, n, c, 3) [N], from their forces on the platform."""
+    return -(carriers_of(robot).holds @ forces)
+
+
+def worst_of(rows: list[Row], times: np.ndarray, begins_inside: bool = True) -> list[tuple[float, str]]:
+    """Return the largest excess of each stop, relative to a limit's range, and the text of that limit.
+
+    Unless a stop should begin inside, so much as it has first is no excess. What is undefined is infinitely much.
+    """
+    values = np.stack([row.values for row in rows])  # (k, d, n)
+    low, high, accepted = np.array([row[2:] for row in rows]).T[..., None, None]  # (k, 1, 1) each
+    floor = low if begins_inside else np.minimum(low, values[..., :1])
+    ceiling = high if begins_inside else np.maximum(high, values[..., :1])
+    beyond = np.where(np.isnan(values), np.inf, np.maximum(floor - values, values - ceiling) / _range(low, high))
+    beyond = np.where(beyond > accepted, beyond, 0.0)
+    worst = [(0.0, "")] * len(times)
+    for d, excess in enumerate(beyond.max(axis=(0, 2)).tolist()):
+        if excess > 0:
+            k, at = np.unravel_index(np.argmax(beyond[:, d]), beyond[:, d].shape)
+            value = values[k, d, at]
+            bound = float(low[k, 0, 0] if value < low[k, 0, 0] else high[k, 0, 0])
+            worst[d] = excess, f"{rows[k].name}: {quantity(value)} of {bound:g} at {quantity(times[d, at], 's')}"
+    return worst
+
+
+def _range(low: Any, high: Any) -> Any:
+    """Return the range of a limit, which is not zero where both ends are the same."""
+    return np.maximum(high - low, ROUNDING * np.abs(high))
+
+
+def limits_of(
+    robot: Robot,
+    motion: Motion,
+    forces: np.ndarray,
+    tensions: np.ndarray,
+    turning: tuple[np.ndarray, np.ndarray, np.ndarray],
+    windings: np.ndarray | None,
+    limits_lacking: bool = False,
+) -> list[Row]:
+    """Return what a motion of the carriers, (d, n, c, 6) each, requires, and the tensions, (d, n, m) [N].
+
+    `forces` are those of the cables on the platform, (d, n, m, 3) [N], and `windings` those of the motors of winches,
+    (d, n, m) [N], if the file describes winches.
+    `turning` has their rotations and the first and second derivative of these, (d, n, c, 3, 3) each. If
+    `limits_lacking`, a carrier that turns about another point than its anchor has a limit for the force that is missing
+    from its actuators: it can turn too quickly for its cables to stay taut.
+    """
+    its, (_, velocity, acceleration), R, pull = carriers_of(robot), motion, turning[0], pull_of(robot, forces)
+    down = R.swapaxes(-1, -2)
+    spin, spun = (points.axial(down @ part) for part in turning[1:])
+    force = (down @ (its.mass * (acceleration[..., :3] - np.array(robot.gravity)) - pull)[..., None])[..., 0]
+    impulse, change = ((its.inertia @ part[..., None])[..., 0] for part in (spin, spun))
+    on_anchors = (down[..., robot.carrier_of_cable, :, :] @ -forces[..., None])[..., 0]
+    moment = change + points.cross(spin, impulse) - its.holds @ points.cross(robot.anchors, on_anchors)
+    wrenches = np.concatenate([force, moment], axis=-1)
+    speeds, bends = (np.linalg.norm(part[..., :3], axis=-1) for part in (velocity, acceleration))
+    tilts, ranges = np.arccos(np.clip(R[..., 2, 2], -1, 1)), zip(robot.t_min, robot.t_max, strict=True)
+    rows = list[Row]()
+    for i, (low, high) in enumerate(ranges):
+        accepted = min(ACCEPTED, SLACKER * low / _range(low, high) + ROUNDING)  # so that no cable pushes
+        rows.append(Row(f"tension {i + 1}", tensions[..., i], low, high, accepted))
+    if windings is not None:
+        most = enumerate(largest_forces(robot))
+        rows += [
+            Row(f"winch_force of cable {i + 1}", windings[..., i], 0.0, high) for i, high in most if np.isfinite(high)
+        ]
+    for k, carrier in enumerate(robot.carriers):
+        wrench, name, own = wrenches[:, :, k], carrier.name, carrier.motion_limits
+        commands = wrench @ its.commands[k]
+        rows += [Row(f"{a.name} of {name}", commands[..., i], a.low, a.high) for i, a in enumerate(its.actuators[k])]
+        if limits_lacking and carrier.actuators and its.anchors[k].any():
+            given = commands @ np.array([a.wrench for a in its.actuators[k]])
+            lacking = np.linalg.norm((wrench - given)[..., :3], axis=-1)
+            most = max(robot.t_min[its.first[k]], LACKING * robot.t_max[its.first[k]])
+            rows.append(Row(f"force perpendicular to the thrust of {name}", lacking, 0.0, most))
+        for what, values, largest in (
+            ("speed", speeds, own.speed),
+            ("acceleration", bends, own.acceleration),
+            ("tilt", tilts, own.tilt),
+        ):
+            rows += [] if largest is None else [Row(f"{what} of {name}", values[..., k], 0.0, largest)]
+    return rows
