@@ -32,7 +32,8 @@ SAME = 1e-7  # [m, rad]
 SIDES = 64  # of the polygon inside the circle of accelerations: it gives away 0.12 %
 LEAST = 40  # intervals between two rests, or between a rest and a bend
 SHARE_OF_BEND = 0.5  # of all intervals, that each bend has: there the limits of speed change at once
-MOST_IN_BENDS = 6400  # in all together, if that is more than LEAST in each
+MOST_IN_BENDS = 6400  # in all together, if that is more than FEWEST in each
+FEWEST = 16  # intervals in a bend, or between two bends, of a path with hundreds of them
 CLOSE = 1e-9  # of s
 LOOKS = 2001  # points at which the geometry is checked
 HALVES = 40  # of the s between two of them
@@ -111,7 +112,9 @@ class ParametrisedPath:
         bends = np.vstack([path.bends() for path in (self.path, *self.carriers.values())])
         rests = np.array(sorted(self.dwell))
         edges = np.concatenate([[0.0], rests[(rests > 0) & (rests < 1)], [1.0]])
-        in_bend = max(LEAST, min(round(SHARE_OF_BEND * intervals), MOST_IN_BENDS // max(len(bends), 1)))
+        each = MOST_IN_BENDS // max(len(bends), 1)
+        usual = min(LEAST, max(each, FEWEST))
+        in_bend = max(usual, min(round(SHARE_OF_BEND * intervals), each))
         grids = []
         for start, end in pairwise(edges):
             inner = np.unique(bends[(bends > start + CLOSE) & (bends < end - CLOSE)])
@@ -119,7 +122,7 @@ class ParametrisedPath:
             parts = np.concatenate([[start], inner, [end]])
             middle = (parts[1:] + parts[:-1]) / 2
             bent = np.any((bends[:, :1] < middle) & (middle < bends[:, 1:]), axis=0)
-            least = np.where(bent, in_bend, LEAST if len(edges) > 2 or inner.size else 1)
+            least = np.where(bent, in_bend, usual if len(edges) > 2 or inner.size else 1)
             counts = np.maximum(np.ceil(intervals * np.diff(parts) - 1e-9).astype(int), least)
             points = [_grid(*its)[:-1] for its in zip(parts[:-1], parts[1:], counts, bent, strict=True)]
             grids.append(np.append(np.concatenate(points), end))

@@ -46,14 +46,18 @@ from .timed_task import ACCELERATIONS, KNOWN_LIMITS, SPEEDS, check_task
 
 ATTEMPTS = 12
 MOST_INTERVALS = 6400
+SPLIT = 0.25, 0.5, 0.75  # of an interval in which much is missing: further points
+MOST_SPLITS = 3  # times that such intervals are split
 FINER_TRIES = 2  # after a grid on which the search ended without a law
 RESERVE = 1e-7  # of the weight, kept from the tension limits against rounding
 LARGEST_RESERVE = 0.01  # of the weight
+LITTLE = 1e-4  # of the weight: if no more than this is missing anywhere, it becomes a reserve everywhere
 LARGEST_SHRINK = 0.01
 COARSE = 4e-3  # of the weight: if more is missing it takes a finer grid, if less a reserve there
 RISE = 2.5  # times 1 / intervals: change of the logarithm of a zone's bound from point to point
 NEAR_REST = 0.5 ** np.arange(7.0, 0.0, -1.0)  # of the interval beside a rest, where further points are
 CLOSEST = 1e-3  # of a step of a grid: points that are nearer to each other are one
+FINEST = 1e-2  # of that, for points that split an interval
 COARSE_EXCESS = 1e-4  # of a limit: if it is exceeded by more it takes a finer grid, if by less some distance everywhere
 MOST_CUTS = 24  # times that half-planes of motors are added
 PIECES = (400, 800, 1600)  # of a spline through points of a path, until it is near enough
@@ -80,7 +84,7 @@ def time_along(robot: AnyRobot, task: Task | dict[str, Any] | str | os.PathLike[
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
         task: A `Task`, a mapping with its keys, or the path of a YAML file, as for `plan`.
-        grid: Initial number of intervals, from 10 to 6400; the audit may double it.
+        grid: Initial number of intervals, from 10 to 6400; after an audit that fails there are more.
 
     Returns:
         Plan: Audited like every plan. Its task contains the time law, so `plan` audits the same motion again; `law`
@@ -120,13 +124,14 @@ def _limits(robot: Robot, task: Task, moving: list[int]) -> PathLimits:
 def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, intervals: int) -> Plan:
     """Solve and audit; after a violation again, on a finer grid or with more distance from the limits."""
     margin, weight = task.margin, parametrised.robot.force_scale
-    short, shrink, attempts, failures = list[_Stretches](), 0.0, 0, 0
+    short, shrink, attempts, failures, splits = list[_Stretches](), 0.0, 0, 0, 0
+    further = np.zeros(0)
     zones = [limit for limit in limits.speeds if isinstance(limit, ZoneSpeed)]
     corners = np.concatenate([[], *(parametrised.crossings(zone) for zone in zones)])
     while True:
         attempts += 1
         rises = np.concatenate([[], *(parametrised.rises(zone, RISE / intervals) for zone in zones)])
-        grids = [_through(s, corners, np.append(rises, _rests(s))) for s in parametrised.pieces(intervals)]
+        grids = [_through(s, corners, np.append(rises, _rests(s)), further) for s in parametrised.pieces(intervals)]
         pieces = [_piece(parametrised, limits, s, margin, _reserve(s, short, weight), shrink) for s in grids]
         s = np.concatenate([pieces[0].s[:1], *(piece.s[1:] for piece in pieces)])
         law = FastestLaw(parametrised, limits, margin, s, np.full(len(s), np.nan))
@@ -159,7 +164,10 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
         known = (each for each in audited.excess if each.limit in KNOWN_LIMITS and each.limit != WinchForce.name)
         excess = max([0.0, *(each.value / each.bound - 1.0 for each in known)])
         # A grid too coarse for a bend misses it by so much that as large a reserve would leave no tension at all.
-        if intervals < MOST_INTERVALS and (missing.newtons.max() > COARSE * weight or excess > COARSE_EXCESS):
+        if splits < MOST_SPLITS and missing.newtons.max() > COARSE * weight:
+            further, splits = np.append(further, _between(law.s, missing, COARSE * weight)), splits + 1
+            intervals = min(2 * intervals, MOST_INTERVALS)
+        elif intervals < MOST_INTERVALS and excess > COARSE_EXCESS:
             intervals = min(2 * intervals, MOST_INTERVALS)
         else:
             short.append(missing)
@@ -174,18 +182,19 @@ def _rests(s: np.ndarray) -> np.ndarray:
     return np.append(s[0] + NEAR_REST * (s[1] - s[0]), s[-1] - NEAR_REST * (s[-1] - s[-2]))
 
 
-def _through(s: np.ndarray, corners: np.ndarray, rises: np.ndarray) -> np.ndarray:
-    """Return a grid with further points at corners of the bound of the speed and where that rises.
+def _through(s: np.ndarray, corners: np.ndarray, rises: np.ndarray, further: np.ndarray) -> np.ndarray:
+    """Return a grid with points at corners of the bound of the speed, where that rises, and `further` ones.
 
     A time law that is slow enough at the first point in a zone would be too fast between its edge and that point.
     """
     least = CLOSEST * (s[-1] - s[0]) / len(s)
     points = s[[0, -1]]
-    for further, smallest in ((corners, least), (s[1:-1], 0.0), (rises, least)):
-        inside = np.sort(further[(further > s[0]) & (further < s[-1])])
-        inside = inside[np.diff(inside, prepend=-np.inf) > smallest]
+    others = (corners, least, least), (s[1:-1], 0.0, least), (rises, least, least), (further, 0.0, FINEST * least)
+    for these, from_each_other, from_those_before in others:
+        inside = np.sort(these[(these > s[0]) & (these < s[-1])])
+        inside = inside[np.diff(inside, prepend=-np.inf) > from_each_other]
         after = np.searchsorted(points, inside)
-        apart = np.minimum(inside - points[after - 1], points[after] - inside) > least
+        apart = np.minimum(inside - points[after - 1], points[after] - inside) > from_those_before
         points = np.sort(np.append(points, inside[apart]))
     return points
 
@@ -219,14 +228,26 @@ class _Stretches(NamedTuple):
 
 
 def _missing(law: FastestLaw, audited: Audit) -> _Stretches:
-    """Return where an audit found no tensions, and all of s for tensions beyond their limits, if they are too few."""
+    """Return where an audit found no tensions, and all of s for tensions of too few cables and for little wrenches."""
     beyond = [abs(each.value - each.bound) for each in audited.excess if each.limit in (TENSIONS, WinchForce.name)]
     rows = np.flatnonzero(audited.violation > audited.tolerance)
     at = law.path.law(audited.times)[0]
     first, last = np.searchsorted(law.s, [at[rows], at[np.minimum(rows + 1, len(at) - 1)]])
     start, end = law.s[(first - 2).clip(0)], law.s[(last + 1).clip(max=len(law.s) - 1)]
+    if (most := audited.violation.max()) <= LITTLE * law.parametrised.robot.force_scale:
+        beyond.append(most)  # in the next law others would miss as little elsewhere
     whole = _Stretches(np.zeros(1), np.ones(1), np.array([max([0.0, *beyond])]))
     return _Stretches(*map(np.append, (start, end, audited.violation[rows]), whole))
+
+
+def _between(s: np.ndarray, missing: _Stretches, newtons: float) -> np.ndarray:
+    """Return points that split the intervals of a grid in which more than so many `newtons` are missing."""
+    coarse = np.zeros(len(s) - 1, bool)
+    for start, end, its in zip(*missing, strict=True):
+        if its > newtons:
+            coarse[np.searchsorted(s, start) : np.searchsorted(s, end)] = True
+    start, end = s[:-1][coarse], s[1:][coarse]
+    return np.concatenate([start + part * (end - start) for part in SPLIT])
 
 
 def _reserve(s: np.ndarray, short: list[_Stretches], weight: float) -> np.ndarray:
