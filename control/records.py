@@ -54,7 +54,9 @@ CARRIER = np.dtype(
 _AXIS = np.dtype(
     [*((name, "f8") for name in ("usual", "order")), *((name, "f8", 2) for name in ("late", "rate", "unseen"))]
 )
-TURNING = np.dtype([("axis", _AXIS, (MOST_CARRIERS, 3)), ("sums", "f8", 6), ("lag", "f8"), ("has_begun", "i8")])
+TURNING = np.dtype(
+    [("axis", _AXIS, (MOST_CARRIERS, 3)), ("sums", "f8", 6), ("lag", "f8"), ("compared", "f8"), ("has_begun", "i8")]
+)
 TETHER = np.dtype(
     [
         *((name, "i4") for name in ("carrier", "cables")),

@@ -95,6 +95,7 @@ typedef struct {
     towline_turning_axis axis[TOWLINE_MOST_CARRIERS][3];
     double sums[TOWLINE_TURNING_SUMS];
     double lag;        /* of carriers that turn too late, else 0 [s] */
+    double compared;   /* time since the comparison began [s] */
     int64_t has_begun; /* 1 after the first step */
 } towline_turning;
 

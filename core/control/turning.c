@@ -18,7 +18,7 @@
  * T and C are believed if they explain nine tenths of the squares of x - r: moments that nobody ordered, or rotors
  * that were not at rest when the comparison began, can look like a long lag. With the three axes of one carrier, and two
  * independent values of each (a memory of 8 / h, and filters that correlate values over 4 / h), this is an F-test at the
- * level of 1 %: 18.0 for 2 and 4 degrees of freedom.
+ * level of 1 %: 18.0 for 2 and 4 degrees of freedom. In less than 4 / h there are no two independent values.
  *
  * An oscillation of frequency w shows a delay as T = sin(w D) / w and C = (1 - cos(w D)) / w^2. So C / T^2 is between
  * 1/2, of a slow one, and 1 / (1 + cos(w D)) = 0.81 at h D = 0.647, where w = 2.06 h.
@@ -39,6 +39,7 @@ static const double MEMORY = 4;      /* windows that count, so that what is smal
 static const double FASTEST = 1e4;   /* [rad/s]: nothing turns faster */
 static const double SEEN = 0.006;    /* [rad]: what the lag makes of a carrier's attitude until it is believed */
 static const double EXPLAINED = 0.9; /* of the squares of x - r */
+static const double SOME = 2;        /* windows that sums are of until they are believed */
 static const double ALIKE = 1e-3;    /* of the product of their squares: derivatives that cannot be told apart */
 
 enum { SUMS = TOWLINE_TURNING_SUMS };
@@ -111,9 +112,11 @@ void towline_measure_lag(const towline_robot *robot, double bandwidth, double dt
     if (!again) {
         for (int k = 0; k < SUMS; k++) { it->sums[k] += (now[k] - dt * it->sums[k] / MEMORY) / window; }
     }
+    it->compared += dt;
     const double rate = SEEN * WINDOW * bandwidth * bandwidth / LATE;
     double T = 0;
-    const double late = it->sums[2] > rate * rate ? lateness(it->sums, &T) : 0;
+    const int known = it->compared > SOME * window && it->sums[2] > rate * rate;
+    const double late = known ? lateness(it->sums, &T) : 0;
     const int too_late = late > 0 && (T * bandwidth > LATE || late * bandwidth > UNSTABLE);
     it->lag = too_late ? fmax(T, late / MARGIN) : 0;
 }
