@@ -397,6 +397,15 @@ def test_an_arc_of_many_chords_is_timed():
     assert timing.feasible, timing.reason  # tensions are missing in a few bends: only there is the grid refined
 
 
+def test_what_no_time_law_changes_ends_the_search():
+    robot = point_mass([[2, 2, 3], [-2, 2, 3], [-2, -2, 3], [2, -2, 3]], ["x", "y", "z"])
+    below = robot.model_copy(update={"floor": 0.1})
+    timing = time_along(below, along({"kind": "line", "start": [0, 0, 0.5], "end": [0.5, 0, 0]}))
+    assert timing.status is MotionStatus.NOT_FOUND
+    assert timing.reason == "the path exceeds limits at any speed"
+    assert "floor" in str(timing.audit.excess[0])
+
+
 def test_corners_and_dwells_are_rests_of_the_fastest_law():
     """A mass below one cable goes up, dwells, comes down again, and each way has a closed form."""
     mass, up, down = 2.0, 40 / 2.0 - GRAVITY, GRAVITY - 1 / 2.0

@@ -155,14 +155,18 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
         audited = audit(scenario, None)
         if audited.passed:
             return Plan(scenario, MotionStatus.FEASIBLE, None, audited, 0.0, 0.0, law=law)
-        if attempts == ATTEMPTS:
-            law = replace(law, at=float(law.path.law(audited.times[[audited.worst]])[0][0]))
-            reason = f"no time law passed the audit in {ATTEMPTS} attempts"
-            return Plan(scenario, MotionStatus.NOT_FOUND, None, audited, 0.0, 0.0, reason, law=law)
         missing = _missing(law, audited)
         # What motors lack, a reserve makes up for, as for missing wrenches.
         known = (each for each in audited.excess if each.limit in KNOWN_LIMITS and each.limit != WinchForce.name)
         excess = max([0.0, *(each.value / each.bound - 1.0 for each in known)])
+        changeable = any(each.limit in (TENSIONS, *KNOWN_LIMITS) for each in audited.excess)
+        path_alone = len(missing.newtons) == 1 and not changeable  # it exceeds what no time law changes
+        if attempts == ATTEMPTS or path_alone:
+            law = replace(law, at=float(law.path.law(audited.times[[audited.worst]])[0][0]))
+            reason = f"no time law passed the audit in {attempts} attempts"
+            if path_alone:
+                reason = "the path exceeds limits at any speed"
+            return Plan(scenario, MotionStatus.NOT_FOUND, None, audited, 0.0, 0.0, reason, law=law)
         # A grid too coarse for a bend misses it by so much that as large a reserve would leave no tension at all.
         if splits < MOST_SPLITS and missing.newtons.max() > COARSE * weight:
             further, splits = np.append(further, _between(law.s, missing, COARSE * weight)), splits + 1
