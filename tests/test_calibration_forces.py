@@ -141,6 +141,22 @@ def test_slack_cables_are_no_stretch_of_the_others():
     assert "hardly pull" in str(result.report())
 
 
+def test_stretch_follows_the_tensions_at_estimated_poses():
+    """Ropes that stretch by up to 2 %, of platforms that tilt by up to 25 degrees, at 27 places."""
+    poses, readings, _, tensions, offsets = rests(1)
+    readings = (readings + offsets) / (1 + tensions / 4e3) - offsets
+    errors = Rotation.from_rotvec(np.random.default_rng(7).normal(0, 2e-3, (27, 3)))
+    angles = (errors * Rotation.from_euler("xyz", poses[:, 3:])).as_euler("xyz")
+    log = Measurements(readings, orientations=angles, sigma={"lengths": 1e-3, "rotation": 2e-3})
+    found = calibrate(drawn(COM + 0.02), log, ("offsets", "com"))
+    elastic = found.parameters[-1]
+    assert abs(elastic.value - 1 / 4e3) < 3 * elastic.sigma < 0.3 / 4e3
+    assert np.abs(found.robot.platform.com - COM).max() < 0.003
+    assert (
+        np.sqrt(((found.poses - poses)[:, :3] ** 2).sum(axis=1).mean()) < 0.015
+    )  # 540 mm with tensions at level poses
+
+
 def test_a_wrong_reading_of_a_hanging_platform_is_listed():
     """Orientations and the balance of forces are redundant, although four lengths fit any pose."""
     _, readings, angles, _, offsets = rests(0)

@@ -38,12 +38,14 @@ MOST_CAPSTAN = 30.0  # of which exp is no overflow
 class Balanced(NamedTuple):
     """Residuals (N, 6), and their derivatives by parameters (N, 6, P) and by shift and rotation (N, 6, 6), if wanted.
 
-    Coordinates that are locked have zeros.
+    Coordinates that are locked have zeros. The most likely tensions change by `carried` (N, m, 6) [N] times the
+    residuals.
     """
 
     residuals: np.ndarray
     by_parameters: np.ndarray | None = None
     by_pose: np.ndarray | None = None
+    carried: np.ndarray | None = None
 
 
 class FeltTensions(NamedTuple):
@@ -308,7 +310,10 @@ class Balance:
             result[:, rows] = weighted @ derivatives[:, rows]
             return result
 
-        return Balanced(residuals, reduce(raw), reduce(by_pose))
+        carried = np.zeros((count, m, 6))
+        behind = np.swapaxes(of_log.inner, 1, 2) @ np.swapaxes(inverse_root, 1, 2)
+        carried[..., rows] = -gain * of_log.variances[..., None] * behind
+        return Balanced(residuals, reduce(raw), reduce(by_pose), carried)
 
 
 def hangs(robot: Robot, measurements: Measurements) -> bool:

@@ -20,10 +20,9 @@ The pose of sample k is the pose measured at t_k + clock, or an initial one, plu
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -38,69 +37,11 @@ from .carrier_motion import CarrierMotion
 from .geometry import runs
 from .parameters import COMMON, FRAMES, IN_BALANCE, OF_CABLE, OF_ROBOT, Parameters, in_plane, prior_sigmas
 from .pose_frames import Poses, reframed, twists_of
-from .sightings import Sighted, sightings
+from .residuals import Derivatives, Residuals, State
+from .sightings import sightings
 
 STILL = 1e-4  # [m] along directions that are kept
 PART = 4000  # samples whose derivatives are computed together
-
-
-class State(NamedTuple):
-    """Parameters and poses.
-
-    Attributes:
-        x: Parameters, (P,).
-        shift, turn: Increments of the poses from their initial values, in {G}: (N, 3) [m], (N, 3, 3).
-        errors: Errors of the tensions that stretch cables, in standard deviations, (N, d).
-    """
-
-    x: np.ndarray
-    shift: np.ndarray
-    turn: np.ndarray
-    errors: np.ndarray
-
-
-class Residuals(NamedTuple):
-    """Differences over their standard deviations.
-
-    Their shapes: readings (m, N), poses and errors of tensions (N, 6 + d), parameters (P,) and kept directions (d,),
-    balance of forces (N, 6), directions (m, N, 3); the last two (N, 0), (m, N, 0) if they are no part of the fit.
-    """
-
-    readings: np.ndarray
-    poses: np.ndarray
-    parameters: np.ndarray
-    balance: np.ndarray
-    directions: np.ndarray
-
-    @classmethod
-    def together(cls, parts: Sequence[Residuals]) -> Residuals:
-        """Return the residuals of successive parts of a log as one; those of the parameters are the same in all."""
-        if len(parts) == 1:
-            return parts[0]
-        readings, poses, parameters, balance, directions = zip(*parts, strict=True)
-        one, other = (np.concatenate(of, axis=1) for of in (readings, directions))
-        return cls(one, np.concatenate(poses), parameters[0], np.concatenate(balance), other)
-
-    @property
-    def of_samples(self) -> np.ndarray:
-        """Return the sum of squares of each sample, (N,), inf where a cable has no length."""
-        total = (self.readings**2).sum(axis=0) + (self.directions**2).sum(axis=(0, 2))
-        total += sum((part**2).sum(axis=1) for part in (self.poses, self.balance))
-        return np.where(np.isfinite(total), total, np.inf)
-
-
-class Derivatives(NamedTuple):
-    """Derivatives of the residuals of readings, and balance and directions, where measured, with their own."""
-
-    cables: np.ndarray  # derivatives by the parameters of the cable itself, (m, N, 15)
-    others: np.ndarray  # derivatives by the parameters of the robot and slips that vary, (m, N, k)
-    # derivatives by shift and rotation of the sample itself, and errors of its tensions, (m, N, 6 + d)
-    poses: np.ndarray
-    # R b of each cable (m, N, 3) [m], and its length (m, N) [m]
-    arms: np.ndarray
-    lengths: np.ndarray
-    balance: Balanced | None = None
-    directions: Sighted | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +148,8 @@ class Model(Displayed):
         if count <= PART:
             yield slice(None), self, state
             return
-        known = {name: getattr(self, name) for name in ("size_is_open", "prior_sigmas", "kept_rows", "_in_plane")}
+        shared = ("size_is_open", "pulled_at_poses", "prior_sigmas", "kept_rows", "_in_plane")
+        known = {name: getattr(self, name) for name in shared}
         for first in sorted(range(0, count, PART), reverse=backwards):
             part = self.only(rows := slice(first, first + PART))
             balanced = None if self.balanced is None else part.forces
@@ -223,6 +165,12 @@ class Model(Displayed):
         tensions, _ = self._forces.tensions(self.parameters.table(self.parameters.first), smooth=True)
         return FeltTensions(tensions, np.zeros((*tensions.shape, 0)))
 
+    @cached_property
+    def pulled_at_poses(self) -> bool:
+        """Return whether the tensions that stretch cables are those at the estimated poses of a platform at rest."""
+        pulled = self.felt is not None and self.measurements.tensions is None and self.size_is_open
+        return pulled and self.balanced is not None and self.balanced.at_rest
+
     @property
     def _open(self) -> int:
         return 0 if self.felt is None else self.felt.errors.shape[2]
@@ -234,7 +182,12 @@ class Model(Displayed):
         """
         if self.felt_tensions is None:
             return np.ones((self.robot.m, 1)), np.zeros((self.robot.m, 1)), np.zeros((self.robot.m, 1, 0))
-        felt = (self.felt_tensions.tensions + (self.felt_tensions.errors @ state.errors[..., None])[..., 0]).T
+        known = self.felt_tensions.tensions
+        if self.pulled_at_poses:
+            # The file's ends of cables do: derivatives by the ends of other cables would fill the normal matrix.
+            x = np.concatenate([self.parameters.first[: self.parameters.clock], state.x[self.parameters.clock :]])
+            known = self._forces.carrying(self.parameters, x, self.poses(state), self.ahead)
+        felt = (known + (self.felt_tensions.errors @ state.errors[..., None])[..., 0]).T
         tensions = np.maximum(felt, 0.0)
         by_errors = self.felt_tensions.errors.swapaxes(0, 1) * (felt > 0)[..., None]
         return 1 / (1 + tensions * self.parameters.compliances(state.x)[:, None]), tensions, by_errors
@@ -325,7 +278,9 @@ class Model(Displayed):
         if self.balanced is not None:
             placed = position, rotation
             forces = self.balanced.at(parameters, state.x, placed, self.ahead, self.noise, derive)
-        weighs = inside if self.unbalanced is None else inside & ~self.unbalanced
+        # Forces alone would move a pose without readings to infinity, where all cables are parallel.
+        weighs = inside & (self.weights.any(axis=0) | ~np.isinf(sigmas).any(axis=1))
+        weighs = weighs if self.unbalanced is None else weighs & ~self.unbalanced
         in_balance = np.zeros((len(position), 0)) if forces is None else forces.residuals * weighs[:, None]
         seen = sightings(parameters, state.x, (position, rotation), run, at, self.measurements, carried, derive)
         if seen is not None:
@@ -349,7 +304,6 @@ class Model(Displayed):
         by_strain = -gain * stretch**2 * run.lengths
         cables[..., 10] = by_strain * tensions
         cables[..., 11:] = 0.0
-        by_errors = (by_strain * parameters.compliances(state.x)[:, None])[..., None] * by_errors
         last = np.flatnonzero(parameters.varies[parameters.clock :])
         moved, others = last[last < OF_ROBOT], np.zeros((m, len(position), len(last)))
         if velocity is not None or (moved >= FRAMES.start).any():
@@ -362,10 +316,19 @@ class Model(Displayed):
             if carried is not None:
                 others[..., last == 0] -= np.einsum("mni,mni->mn", by_pose[..., :3], carried[0])[..., None]
         others[..., last == COMMON] += cables[..., 10:11]
+        by_tension = (by_strain * parameters.compliances(state.x)[:, None])[..., None]
+        pulled = forces.carried if self.pulled_at_poses and forces is not None else None
+        if pulled is not None and forces is not None and forces.by_pose is not None:
+            pulls = pulled * ((tensions > 0)[..., None] * by_tension).swapaxes(0, 1)  # (N, m, 6)
+            by_pose = by_pose + (pulls @ forces.by_pose).swapaxes(0, 1)
+            if forces.by_parameters is not None:
+                own = forces.by_parameters[..., parameters.clock + moved]
+                others[..., : len(moved)] += (pulls @ own).swapaxes(0, 1)
         for column, (cable, first) in enumerate(parameters.slips, start=len(moved)):
             others[cable, first:, column] = -gain[cable, first:]
         forces = self._kept(forces, weighs)
         if self._open:
+            by_errors = by_tension * by_errors
             by_pose = np.concatenate([by_pose, np.broadcast_to(by_errors, (*by_pose.shape[:2], self._open))], axis=2)
         return residuals, Derivatives(cables, others, by_pose, arms, run.lengths, forces, seen)
 

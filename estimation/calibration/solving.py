@@ -272,7 +272,7 @@ def _stretched(model: Model, state: State, length: float) -> Model:
     Noise of tensions would make a cable seem stiffer, so their errors are unknowns if the stiffness is free.
     """
     compliance, known = model.parameters.compliances(state.x), model.felt_tensions
-    if known is None or model.forces is None or not compliance.any():
+    if known is None or model.forces is None or not compliance.any() or model.pulled_at_poses:
         return model
     felt = carrying(model, state) or model.forces.felt(model.parameters.table(state.x), model.noise)
     by_newtons = compliance * length / model.measurements.sigma.lengths

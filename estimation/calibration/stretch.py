@@ -36,7 +36,8 @@ def with_elasticity(solved: Solved) -> tuple[tuple[str, ...], dict[str, float]]:
     """
     of, groups, prior = solved.model, solved.model.parameters.groups, dict(solved.model.prior)
     turns = turning(of.robot, of.measurements)
-    if turns is not None and turns.enough and "attachments" not in groups:
+    # Unknown poses would adapt to errors of the attachments, too.
+    if turns is not None and turns.enough and not of.size_is_open and "attachments" not in groups:
         groups = (*groups, "attachments")
         prior["attachments"] = usual_error(of)
     arms = of.robot.attachments.std(axis=0)
