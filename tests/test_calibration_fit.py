@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-from towline.estimation.calibration import Measurements, calibrate, cross_validation, starts
+from towline.estimation.calibration import Measurements, calibrate, cross_validation, representative, starts
 from towline.estimation.calibration import model as model_module
 from towline.estimation.calibration.autocorrelation import information_of
 from towline.estimation.calibration.curvature import curvature
@@ -17,6 +17,7 @@ from towline.estimation.calibration.geometry import length_of
 from towline.estimation.calibration.normal_equations import NormalEquations, metric
 from towline.estimation.calibration.parameters import OF_CABLE
 from towline.estimation.calibration.solving import model_of
+from towline.estimation.logs.smoothing import Parabolas
 from towline.models import Dynamics, Robot, load
 from towline.solvers import solve_batch
 
@@ -222,6 +223,52 @@ def test_memory_of_a_long_log():
     tracemalloc.stop()
     assert found.clock == pytest.approx(0.02, abs=1e-4)
     assert peak < 750 * count + 20e6  # of the derivatives of a part
+
+
+def test_of_an_oversampled_log_some_samples_are_used(monkeypatch):
+    """They show clock, anchors, a slip and a wrong reading; motions that are hardly sampled need all."""
+    monkeypatch.setattr(representative, "MANY", 600)
+    monkeypatch.setattr(representative, "BLOCKS", 5)
+    draw, count = np.random.default_rng(3), 6_000
+    robot, times = load("cogiro"), 0.01 * np.arange(count)
+    built, home = moved_anchors(robot, draw, 0.02), robot.home
+
+    def poses(at):
+        swing = np.sin(np.outer(at, [1.1, 0.7, 0.9, 0.6, 0.8, 0.5]) + np.arange(6))
+        return home + [3, 2, 0.8, 0.1, 0.1, 0.3] * swing
+
+    lengths = Dynamics(built).cable_lengths(poses(times + 0.017)) + draw.normal(0, 1e-3, (count, robot.m))
+    lengths[4_000:, 5] += 0.04
+    measured = poses(times) + draw.normal(0, 5e-4, (count, 6))
+    log = Measurements(lengths, measured, times=times, sigma={"lengths": 1e-3, "position": 5e-4, "rotation": 5e-4})
+    samples = representative.representative(robot, log)
+    assert np.ptp(np.diff(samples)) == 0
+    assert 600 <= len(samples) <= 1200
+    lengths[samples[100], 2] += 0.2
+    found = calibrate(robot, log.changed(lengths=lengths))
+    (slip,) = found.slips
+    assert slip.cable == 5
+    assert 0 <= slip.sample - 4_000 < 3 * samples[1]
+    assert slip.size == pytest.approx(-0.04, abs=2e-3)
+    assert f"cables[5].slip at sample {slip.sample}" in [one.name for one in found.parameters]
+    assert (2, samples[100]) in {(one.cable, one.sample) for one in found.outliers}
+    assert found.clock == pytest.approx(0.017, abs=1e-3)
+    names = [one.name for one in found.parameters]
+    at = [i for i, name in enumerate(names) if ".anchor." in name]
+    error = built.anchors.ravel() - [found.parameters[i].value for i in at]
+    assert error @ np.linalg.solve(found.covariance[np.ix_(at, at)], error) < chi2.ppf(0.999, len(at))
+    assert f"from {len(samples)} samples of a longer log" in found.report()
+    shaken = log.changed(poses=measured + 0.01 * np.sin(0.25 * np.arange(count))[:, None])
+    assert representative.representative(robot, shaken) is None
+
+
+def test_no_parabola_extends_over_a_pause():
+    """The last two samples are too few for parabolas of their own."""
+    t = np.concatenate([0.1 * np.arange(30), 50 + 0.1 * np.arange(20), [90.0, 90.1]])
+    values = np.where(t < 10, t**2, 7 - 3 * (t - 50) ** 2)[:, None]
+    fitted = Parabolas(t, 9).fitted(values)
+    np.testing.assert_allclose(fitted.bends[:50, 0], np.where(t < 10, 2.0, -6.0)[:50], rtol=1e-6)
+    assert np.isfinite(fitted.bends).all()
 
 
 def test_a_large_robot_is_known_as_well_as_its_log_tells():

@@ -13,12 +13,14 @@ from scipy.stats import chi2
 
 from towline.base.errors import InputError
 from towline.estimation.calibration import Measurements, calibrate, outliers, solving, stretch
+from towline.estimation.calibration import representative as module
 from towline.estimation.calibration.autocorrelation import information_of
 from towline.estimation.calibration.balance import FeltTensions
 from towline.estimation.calibration.fit import fit
 from towline.estimation.calibration.model import Model
 from towline.estimation.calibration.normal_equations import NormalEquations
 from towline.estimation.calibration.parameters import COMMON, FRAMES, GROUPS, OF_CABLE, Parameters
+from towline.estimation.calibration.representative import representative
 from towline.estimation.calibration.solving import solve
 from towline.estimation.calibration.stretch import with_elasticity, with_stretch
 from towline.estimation.logs.load_cells import slack
@@ -401,9 +403,13 @@ def test_blocks_of_a_long_log_show_stretch_as_all_samples_do(monkeypatch):
     solved = solve(robot, log, ("anchors", "offsets"), {}, False)
     place = solved.model.parameters.clock + COMMON
     whole = with_stretch(solved).fit.state.x[place]
-    monkeypatch.setattr(stretch, "BLOCKS", 3)
-    monkeypatch.setattr(stretch, "BLOCK", 45)
-    assert with_stretch(solved).fit.state.x[place] == pytest.approx(whole, rel=0.1)
+    assert representative(robot, log) is None
+    monkeypatch.setattr(module, "BLOCKS", 3)
+    monkeypatch.setattr(module, "BLOCK", 45)
+    part = log.only(representative(robot, log))
+    assert len(part) == 135
+    of_blocks = with_stretch(solve(robot, part, ("anchors", "offsets"), {}, False))
+    assert of_blocks.fit.state.x[place] == pytest.approx(whole, rel=0.1)
     assert whole == pytest.approx(2e-5, rel=0.1)
     stiff = robot.model_copy(
         update={"cables": tuple(one.model_copy(update={"stiffness": 2e5}) for one in robot.cables)}

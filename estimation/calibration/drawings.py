@@ -25,7 +25,7 @@ def drawings(result: CalibrationData) -> dict[str, Figure]:
     """
     times = result.measurements.times
     wrong = np.zeros(result.residuals.shape, dtype=bool)
-    for one in result.outliers:
+    for one in result._solved.outliers:
         wrong[one.sample, [one.cable, *one.others]] = True
     drawn = {"residuals": pictures.residuals(result.residuals_before, result.residuals, times, wrong)}
     robot, file = result.robot, result.file

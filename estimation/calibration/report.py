@@ -56,7 +56,8 @@ def headline(result: CalibrationData) -> str:
     free = ", ".join(result.free) or "the file as it is, checked"
     state = "" if result.converged else ", NOT CONVERGED"
     source = "from" if result.free else "with"
-    return f"{result.file.name}: {free} {source} {len(result.residuals)} samples{state}"
+    part = "" if result.samples is None else " of a longer log"
+    return f"{result.file.name}: {free} {source} {len(result.residuals)} samples{part}{state}"
 
 
 def facts(result: CalibrationData) -> list[Fact]:

@@ -1,7 +1,7 @@
 """`CalibrationData`: the numbers of a calibrated robot, with their covariance."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -21,7 +21,7 @@ from .differences import PLAUSIBLE
 from .geometry import length_of
 from .load_changes import load_changes
 from .outliers import Outlier, Slip
-from .parameters import OF_ROBOT
+from .parameters import Parameters
 from .plausibility import Mistake
 from .solving import Noise, Solved, covariance_of, inflation_of, is_still, lengths_of
 
@@ -57,12 +57,14 @@ class CalibrationData(Displayed):
         free: Groups of estimated parameters.
         prior: Standard deviations about the file's values, if given, or as large as errors of the file turn out to be.
         mistake: A probable input error of the log, such as cables in another order or degrees read as radians, or None.
+        samples: Indices (k,) of those samples of a long log that were used, or None if all were.
     """
 
     _solved: Solved
     free: tuple[str, ...]
     prior: Mapping[str, float]
     mistake: Mistake | None = None
+    samples: np.ndarray | None = None
 
     def _picture(self) -> str:
         samples = np.arange(len(self.residuals))
@@ -108,7 +110,7 @@ class CalibrationData(Displayed):
             share = f"{100 * len(self.outliers) / self.residuals.size:.0f} %"
             return f"{share} of the readings do not fit the others, so check clocks, frames and sensors"
         if loads := load_changes(self._solved.model, self._solved.fit.state) if "mass" in self.free else []:
-            texts = [f"{quantity(mass, 'kg', digits=3)} from sample {begin} on" for begin, mass in loads]
+            texts = [f"{quantity(mass, 'kg', digits=3)} from sample {self._in_log(begin)} on" for begin, mass in loads]
             return f"the mass changes during the log: {', '.join(texts)}; calibrate each part alone"
         held_out = self.held_out
         if np.isfinite(held_out.after) and held_out.after > max(held_out.before, EXACT * self.stated_sigma):
@@ -177,7 +179,7 @@ class CalibrationData(Displayed):
 
     @property
     def measurements(self) -> Measurements:
-        """Return the measurements."""
+        """Return the measurements that were used (`samples`)."""
         return self._solved.model.measurements
 
     @cached_property
@@ -190,7 +192,7 @@ class CalibrationData(Displayed):
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Return the calibrated parameters, slips included."""
-        of, x = self._solved.model.parameters, self._solved.fit.state.x
+        of, x = self._numbered, self._solved.fit.state.x
         where = np.flatnonzero(of.varies)
         sigmas = np.sqrt(np.diag(self.covariance))
         determined = self._solved.observability.determined
@@ -291,18 +293,24 @@ class CalibrationData(Displayed):
 
     @property
     def outliers(self) -> tuple[Outlier, ...]:
-        """Return the outliers, which the fit excludes."""
-        return self._solved.outliers
+        """Return the outliers, which the fit excludes, by their samples in the log."""
+        return tuple(one._replace(sample=self._in_log(one.sample)) for one in self._solved.outliers)
 
     @property
     def slips(self) -> tuple[Slip, ...]:
-        """Return the slips of winches."""
-        of, x = self._solved.model.parameters, self._solved.fit.state.x
-        sigmas = {parameter.name: parameter.sigma for parameter in self.parameters}
-        return tuple(
-            Slip(cable, sample, float(x[of.clock + OF_ROBOT + i]), sigmas[of.names[of.clock + OF_ROBOT + i]])
-            for i, (cable, sample) in enumerate(of.slips)
-        )
+        """Return the slips of winches, by their samples in the log."""
+        slips = self._numbered.slips
+        own = self.parameters[len(self.parameters) - len(slips) :]
+        return tuple(Slip(*place, one.value, one.sigma) for place, one in zip(slips, own, strict=True))
+
+    def _in_log(self, sample: int) -> int:
+        return sample if self.samples is None else int(self.samples[sample])
+
+    @property
+    def _numbered(self) -> Parameters:
+        """Return the parameters, with the slips by their samples in the log."""
+        of = self._solved.model.parameters
+        return replace(of, slips=tuple((cable, self._in_log(sample)) for cable, sample in of.slips))
 
     @property
     def clock(self) -> float:

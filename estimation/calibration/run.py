@@ -12,6 +12,7 @@ from .file_errors import errors_of_file, loose
 from .geometry import length_of
 from .parameters import GROUPS, IN_BALANCE, check_free, check_prior
 from .plausibility import mistake
+from .representative import representative
 from .solving import check_enough, solve, usual
 from .stretch import is_elastic, uses_slack, with_elasticity, with_stretch
 from .zeros import has_zeros, with_zeros
@@ -56,6 +57,8 @@ def calibrate(
     chosen = as_robot(robot)
     given = check_measurements(chosen, measurements)
     flag("outliers", outliers)
+    samples = representative(chosen, given)
+    given = given if samples is None else given.only(samples)
     found = mistake(chosen, given)
     outliers = outliers and not (found and found.severe)  # nearly all readings would be
     if isinstance(free, str) and free == "auto":
@@ -98,4 +101,4 @@ def calibrate(
         if not uses_slack(solved):
             break
         solved = solve(chosen, given, groups, priors, outliers, solved)
-    return Calibration(solved, groups, priors, found)
+    return Calibration(solved, groups, priors, found, samples)

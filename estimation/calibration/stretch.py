@@ -10,13 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from .balance import Balance, FeltTensions, hangs
+from .balance import hangs
 from .considered import usual_error
 from .fit import held
 from .geometry import length_of
 from .hanging import carrying
 from .left_out import hardly_pull
-from .model import Model, State
 from .normal_equations import NormalEquations, metric
 from .parameters import COMMON, GROUPS
 from .solving import Solved, covariance_of
@@ -24,7 +23,6 @@ from .turning import turning
 
 POSSIBLE, CERTAIN = 3.0, 4.0  # standard deviations of a compliance: of independent errors, and of all
 UNEXPLAINED = 1.5  # times the stated standard deviation, of residuals that the model does not explain
-BLOCKS, BLOCK = 20, 500  # of successive samples of a long log, which show stretch as well as all of them
 OF_COM = 0.1  # of the attachments' distances from each other: error of the CoM in files
 LOOSE = 1e-3  # of the readings, which may be of cables that hardly pull
 
@@ -64,10 +62,10 @@ def with_stretch(solved: Solved) -> Solved | None:
     known = "elasticity" not in more
     if known and (excess < UNEXPLAINED or "com" in groups or "com" not in more):
         return None
-    of, of_some = _some(of, state)
+    of = replace(of, felt=carrying(of, state))
     model = replace(of, parameters=replace(of.parameters, groups=more if known else (*groups, "elasticity")))
     model = replace(model, prior=prior) if known else model
-    equations, varies = NormalEquations.at(model, of_some, scale := metric(model)), model.parameters.varies
+    equations, varies = NormalEquations.at(model, state, scale := metric(model)), model.parameters.varies
     covariance = np.linalg.inv(held(equations.S, length_of(model.robot)))
     step, own = -covariance @ equations.b, np.flatnonzero(varies) == model.parameters.clock + COMMON
     if excess < UNEXPLAINED and not (step[own] > POSSIBLE * excess * np.sqrt(covariance[own, own])).all():
@@ -75,27 +73,6 @@ def with_stretch(solved: Solved) -> Solved | None:
     x = state.x.copy()
     x[varies] += step / scale[varies]
     return replace(solved, fit=solved.fit._replace(state=state._replace(x=x)))
-
-
-def _some(of: Model, state: State) -> tuple[Model, State]:
-    """Return the model and the state of blocks of samples spread over the log, or all, with the tensions they carry.
-
-    Each block has a motion of its own, as those of all samples together would take as long as a fit.
-    """
-    count, given = len(of.measurements), of.measurements
-    blocks = [np.arange(first, first + BLOCK) for first in np.linspace(0, count - BLOCK, BLOCKS).astype(int)]
-    blocks = [rows for rows in blocks if hangs(of.robot, given.only(rows))] if count > 2 * BLOCKS * BLOCK else []
-    if not blocks:
-        return replace(of, felt=carrying(of, state)), state
-    tensions = []
-    for rows in blocks:
-        part = replace(of.only(rows), forces=Balance(of.robot, given.only(rows)))
-        felt = carrying(part, State(state.x, *(one[rows] for one in state[1:])))
-        assert felt is not None
-        tensions.append(felt.tensions)
-    rows, carried = np.concatenate(blocks), np.concatenate(tensions)
-    felt = FeltTensions(carried, np.zeros((*carried.shape, 0)))
-    return replace(of.only(rows), felt=felt), State(state.x, *(one[rows] for one in state[1:]))
 
 
 def certainty(solved: Solved) -> float:

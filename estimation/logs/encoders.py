@@ -40,7 +40,7 @@ def unrolled(readings: np.ndarray) -> tuple[np.ndarray, list[int]]:
     These go from one end of their range to the other in one step, always by the same amount, while another one moves
     on. A single jump shows a usual period.
     """
-    result, rolled = readings.copy(), list[int]()
+    result, rolled = readings, list[int]()
     known = np.where(np.isfinite(readings), readings, np.nan)
     ranges = np.nanmax(known, axis=0, initial=-np.inf) - np.nanmin(known, axis=0, initial=np.inf)
     for i, column in enumerate(readings.T):
@@ -62,6 +62,7 @@ def unrolled(readings: np.ndarray) -> tuple[np.ndarray, list[int]]:
             usual = abs(nearest - period) <= END * period
             if not usual and len(jumps) == 1:
                 continue
+            result = result if rolled else readings.copy()
             result[rows, i] = np.unwrap(y, period=nearest if usual else period)
             rolled.append(i)
     return result, rolled

@@ -312,15 +312,16 @@ def measurements_of(
     kept = _kept(lengths.values, found.lengths) & _kept(tensions.values, found.tensions)
     if not kept.all():
         notes.append(f"samples skipped because lengths or tensions are missing: {quantity(int((~kept).sum()))}")
-    arguments: dict[str, Any] = {"times": None if lengths.times is None else (lengths.times - begin)[kept]}
+    rows = slice(None) if kept.all() else kept  # a copy of a long log takes much memory
+    arguments: dict[str, Any] = {"times": None if lengths.times is None else (lengths.times - begin)[rows]}
     sensors = {"tensions": (tensions, found.tensions), "poses": (position, found.position)}
     sensors["orientations"] = orientation, found.orientation
-    arguments |= {name: one.values[kept] for name, (one, recorded) in sensors.items() if one is not None and recorded}
+    arguments |= {name: one.values[rows] for name, (one, recorded) in sensors.items() if one is not None and recorded}
     if found.orientation and not found.position and "rotation" not in (sigmas.get("sigma") or {}):
         notes.append(f"orientations without positions are taken to be good to {quantity(np.degrees(AHRS), 'deg', 2)}")
         known = sigmas.get("sigma", {})
         sigmas["sigma"] = {"rotation": AHRS, **(known if isinstance(known, Mapping) else {"lengths": known})}
-    measured = Measurements(lengths.values[kept], **arguments, **sigmas)
+    measured = Measurements(lengths.values[rows], **arguments, **sigmas)
     measured.framed = source.recording.framed
     if measured.tensions is not None:
         notes += unreadable_notes(measured.tensions, measured.lengths)

@@ -13,6 +13,7 @@ NEIGHBOURS = 5  # samples of a parabola
 LEFT = 17 / 35  # of the variance of noise, by parabolas through five samples
 LONGEST = 0.5  # [s] of a parabola
 PART = 20_000  # samples that are smoothed together
+PAUSE = 10.0  # median times between samples, over which no parabola extends
 ROUGHER = 1.1  # times their noise: what samples may deviate from the smooth curve through them
 
 
@@ -48,17 +49,23 @@ class _Part(NamedTuple):
 class Parabolas:
     """Parabolas by least squares through `width` neighbours of each sample, at times (N,) [s].
 
+    Samples before and after a pause are no neighbours, unless those between two pauses are too few for a parabola.
     They are computed for some samples at a time: those of a million samples would take more than a gigabyte.
     """
 
     def __init__(self, times: np.ndarray, width: int):
-        self._times, self._width = times, width
+        self._times, self._width, count = times, width, len(times)
+        pauses = np.flatnonzero(np.diff(times) > PAUSE * np.median(np.diff(times))) + 1
+        ends = np.concatenate([[0], pauses, [count]])
+        sizes = np.diff(ends)
+        self._first = np.repeat(np.where(sizes < width, 0, ends[:-1]), sizes)  # neighbour that each sample may have
+        self._last = np.repeat(np.where(sizes < width, count, ends[1:]), sizes)
         self._only = self._part(0) if len(times) <= PART else None
 
     def _part(self, begin: int) -> _Part:
         count, width = len(self._times), self._width
         at = np.arange(begin, min(begin + PART, count))
-        rows = np.clip(at - width // 2, 0, count - width)[:, None] + np.arange(width)
+        rows = np.clip(at - width // 2, self._first[at], self._last[at] - width)[:, None] + np.arange(width)
         apart = self._times[rows] - self._times[at, None]
         unit = np.abs(apart).max(axis=1, keepdims=True)
         basis = np.stack([np.ones_like(apart), apart / unit, (apart / unit) ** 2], axis=2)
@@ -108,7 +115,7 @@ def noise_of(times: np.ndarray, values: np.ndarray) -> float:
     """Return the standard deviation of white noise in values (n, d) that are smooth otherwise, over all d."""
     if len(times) <= NEIGHBOURS or not values.size:
         return 0.0
-    return float(np.sqrt(np.mean(_roughness(times, values, NEIGHBOURS) ** 2) / (1 - LEFT)))
+    return float(np.sqrt(np.mean(roughness(times, values) ** 2) / (1 - LEFT)))
 
 
 def widest_parabola(times: np.ndarray, values: np.ndarray) -> int:
@@ -116,14 +123,14 @@ def widest_parabola(times: np.ndarray, values: np.ndarray) -> int:
     if len(times) <= NEIGHBOURS:
         return NEIGHBOURS
     apart = float(np.median(np.diff(times)))
-    noise = np.maximum(_roughness(times, values, NEIGHBOURS) / np.sqrt(1 - LEFT), 1e-12)
+    noise = np.maximum(roughness(times, values) / np.sqrt(1 - LEFT), 1e-12)
     for n in (51, 31, 21, 15, 11, 7):
-        if n * apart <= LONGEST and len(times) >= 4 * n and (_roughness(times, values, n) <= ROUGHER * noise).all():
+        if n * apart <= LONGEST and len(times) >= 4 * n and (roughness(times, values, n) <= ROUGHER * noise).all():
             return n
     return NEIGHBOURS
 
 
-def _roughness(times: np.ndarray, values: np.ndarray, neighbours: int) -> np.ndarray:
+def roughness(times: np.ndarray, values: np.ndarray, neighbours: int = NEIGHBOURS) -> np.ndarray:
     """Return by how much values (n, d) deviate from parabolas through so many neighbours, (d,), robustly."""
     half = neighbours // 2
     return 1.4826 * np.median(np.abs(values - smooth(times, values, neighbours))[half:-half], axis=0)

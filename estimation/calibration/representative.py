@@ -1,0 +1,58 @@
+"""`representative`: the samples of a long log that are used, which tell nearly as much as all.
+
+The others would only reduce the effect of noise, which is small beside errors of the model in so many samples.
+"""
+
+import numpy as np
+
+from ...models.robot import Robot
+from ..logs.measurements import Measurements
+from ..logs.smoothing import ROUGHER, roughness
+from .balance import hangs
+from .motion import SLOWEST
+
+MANY = 100_000  # samples of a log, of which all are used
+LEAST = 0.5  # of the stated standard deviations: a smaller noise does not matter
+BLOCKS, BLOCK = 20, 1000  # of successive samples where forces count, which take far longer
+
+
+def representative(robot: Robot, measurements: Measurements) -> np.ndarray | None:
+    """Return the samples of a log with times that are used, (k,), or None if all are.
+
+    Of an oversampled log, these are equally many samples apart. If tensions were measured, or weight determines them,
+    blocks of successive ones of these suffice.
+    """
+    count = len(measurements)
+    if measurements.times is None:
+        return None
+    rows = np.arange(0, count, _spacing(robot, measurements)) if count > MANY else np.arange(count)
+    if len(rows) > 2 * BLOCKS * BLOCK and (measurements.tensions is not None or hangs(robot, measurements)):
+        rows = rows[_blocks(len(rows))]
+    return rows if len(rows) < count else None
+
+
+def _blocks(count: int) -> np.ndarray:
+    """Return the samples of blocks that are spread over a log, (k,)."""
+    return (np.linspace(0, count - BLOCK, BLOCKS).astype(int)[:, None] + np.arange(BLOCK)).ravel()
+
+
+def _spacing(robot: Robot, measurements: Measurements) -> int:
+    """Return n if every n-th sample shows the motion of a long log, also between these samples.
+
+    Parabolas through neighbours that are twice as far apart then hardly deviate from them, compared with the noise.
+    """
+    some, given = measurements.only(_blocks(len(measurements))), measurements.sigma
+    assert some.times is not None
+    arm = max(float(np.linalg.norm(robot.attachments, axis=1).max()), 1e-9)
+    of_pose = np.repeat([given.lengths, given.lengths / arm], 3)
+    of_tension = np.zeros(0) if some.tensions is None else given.tensions * np.abs(some.tensions).mean(axis=0)
+    sizes = np.full(robot.m, given.lengths), of_pose, of_tension, np.tile(of_pose, len(robot.carriers))
+    values = some.lengths, some.poses, some.tensions, some.carrier_poses
+    pairs = [(one.reshape(len(some), -1), size) for one, size in zip(values, sizes, strict=True) if one is not None]
+    each, stated = map(np.hstack, zip(*pairs, strict=True))
+    known = np.isfinite(each).all(axis=0)
+    each = each[:, known]
+    most = ROUGHER * np.maximum(roughness(some.times, each), LEAST * stated[known])
+    wanted = min(-(-len(measurements) // MANY), int(SLOWEST / np.median(np.diff(some.times))))
+    fits = (n for n in range(wanted, 1, -1) if (roughness(some.times[:: 2 * n], each[:: 2 * n]) <= most).all())
+    return next(fits, 1)
