@@ -58,8 +58,8 @@ class LengthControl(Controller):
             to 4 and 10, with which no oscillation of the platform on its cables grows (control/length_gains.py). It
             depends on the largest age of the measured pose (from its `time`, or else from `sensors`), and is 0 for
             cables with no damping. If poses are late and have no `time`, pass `sensors` or the gains: the default gains
-            are for current poses, and oscillations would grow. Such a pose is compared with the plan at an
-            earlier time: by the sensors' delay, and by the time since the pose last changed, at most 0.2 s.
+            are for current poses, and oscillations would grow. A pose without `time` is taken to be as old as the
+            sensors' delay plus the time since the pose last changed (at most 0.2 s), and compared with the plan then.
         most: Largest correction of a length [m]; default: 5 % of `Robot.length`, but at least 0.5 % of the longest
             cable, about as much as that cable may stretch. At this value the integral stops, and the status is "hold".
         sensors: Errors and delay of the sensors, a `simulation.Noise` or a mapping (default: unknown). The default of P

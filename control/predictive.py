@@ -54,23 +54,23 @@ class Predictive(ComputedTorque):
     command of a `ComputedTorque` with its default gains that runs in parallel ("soft wrench", "hold"). A step is also
     "soft wrench" if its solution leaves an error that the `ComputedTorque` has no tensions to correct.
 
-    The velocity that the model predicts for the commands is compared with the measured one (control/watch.py). This
-    `ComputedTorque` takes over until `reset` ("not as modelled") if a tenth of the weight, in addition to the noise of
-    `sensors`, is unexplained over about 50 ms, if there is no solution for that long, if noise of the velocity requires
-    more tension than the limits permit, if a carrier loses its thrust or turns too late (core/control/turning.c), or if
-    a pitch goes beyond 1.5 rad. It controls the robot from the start, with a warning, if the loop is unstable at home
-    because carriers turn before they accelerate, as with cables that begin below their CoM.
+    The velocity that the model predicts for the commands is compared with the measured one (control/watch.py). The
+    parallel `ComputedTorque` takes over until `reset` ("not as modelled") if a tenth of the weight, in addition to the
+    noise of `sensors`, is unexplained over about 50 ms, if there is no solution for that long, if noise of the velocity
+    requires more tension than the limits permit, if a carrier loses its thrust or turns too late
+    (core/control/turning.c), or if a pitch goes beyond 1.5 rad. With a warning, it controls the robot from the start if
+    the loop is unstable at home because carriers turn before they accelerate, as with cables that begin below the CoM.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
         bandwidth: Closed-loop bandwidth [rad/s] away from limits, a number or one for each coordinate of the pose.
             Default: 40, but less if carriers correct errors, as they do with cables of fixed length or with fewer
             cables than degrees of freedom: 8 for teams with cables of fixed length, 6 for towing robots with winches.
-            At most 1.2 / `stage` has an effect, 0.45 / `stage` if carriers correct errors.
+            Limited to 1.2 / `stage`, or 0.45 / `stage` if carriers correct errors.
         stages, stage: Number of stages, and duration of each [s]. Default: 20 of 0.015 s; of 0.03 s if carriers may
             leave their reference, because they are slower; of 0.025 s if carriers correct errors. In slow loops, stages
-            become as long as the steps, at most 0.21 s. A loop is slow if the period given to `follow` is longer than
-            two default stages (with carriers that fly: than one), and so are the first two steps or three in a row. A
+            become as long as the steps, at most 0.21 s. A loop is slow if both the period given to `follow` and the
+            steps (the first two, or three in a row) are longer than two default stages, or one if carriers fly. A
             given duration is kept, with a warning if steps are more than 1.2 / `bandwidth` apart.
         reach: Intended maximum deviation of carriers from their reference: position [m] and attitude [rad]. A soft
             scale, not a limit: at this deviation a carrier costs as much as a tension error of 5 % of the robot's

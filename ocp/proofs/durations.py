@@ -42,8 +42,8 @@ class Durations(NamedTuple):
     def describe(self) -> str:
         """Return the shortest and the longest duration as text."""
         if not self.exist:
-            part = f"first {quantity(100 * self.at, '%', 3)}" if self.at else "start"
-            return f"no duration is feasible with the task's time law (proven by the {part} of the motion alone)"
+            part = f"first {quantity(100 * self.at, '%', 3)} of the motion alone" if self.at else "start alone"
+            return f"no duration is feasible with the task's time law (proven by the {part if self.at < 1 else 'end'})"
         upper = "" if self.longest == float("inf") else f", at most {quantity(self.longest, 's')}"
         return f"tensions require at least {quantity(self.shortest, 's')}{upper} with the task's time law"
 

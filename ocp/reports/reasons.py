@@ -23,7 +23,9 @@ def reasons(plan: PlanData) -> list[Fact]:
             facts.append(("search ended at", place))
         else:
             facts.append(("worst position", f"{place}, where no time law is feasible"))
-        facts.append(("motion", f"the motion below only shows the path, in {quantity(plan.duration, 's')}"))
+        facts.append(
+            ("motion", f"the path, shown by a motion of {quantity(plan.duration, 's')} without a feasible time law")
+        )
     if (certificate := plan.certificate) is not None:
         text, phase = certificate.text(up(plan)), in_phase(plan, certificate.time)
         facts += [

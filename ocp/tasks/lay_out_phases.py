@@ -136,9 +136,8 @@ def _supported(scenario: Scenario, columns: np.ndarray, needed: np.ndarray, name
             f"difference, got {-up @ needed[:3]:.6g} N less"
         )
     raise InputError(
-        f"{named[0]}.ground.support must have points on all sides of the CoM of the weight on the ground, where "
-        f"{named[1]} begins or ends, got points that leave {missed[0]:.3g} N of {size:.3g} N (moments included) "
-        "unsupported"
+        f"{named[0]}.ground.support must have points on all sides of the CoM of the weight on the ground, got "
+        f"points that leave {missed[0]:.3g} N of {size:.3g} N (moments included) unsupported where it meets {named[1]}"
     )
 
 
