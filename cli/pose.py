@@ -155,8 +155,8 @@ def _included(estimate: PoseEstimate) -> str:
 
     known = estimate.robot.uncertainty is not None
     file = "and the robot file's uncertainty" if known else "only, because the robot file has no uncertainty"
-    weight = ", but no errors of the CoM" if np.any(estimate.by_gravity) else ""
-    return f"The sigmas include noise of the measurements {file}{weight}."
+    weight = " They do not include errors of the CoM." if np.any(estimate.by_gravity) else ""
+    return f"The sigmas include noise of the measurements {file}.{weight}"
 
 
 def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> None:

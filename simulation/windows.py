@@ -60,7 +60,7 @@ class Windows:
         self.robot = modelled(robot, self.drive, np.isin(np.arange(len(robot.carriers)), self.flown))
         self.assumed = any(cable.stiffness is None for cable in robot.cables)
         if self.assumed and self.drive != "tensions":
-            self.notes.append("cables without a stiffness in the file are given one: 0.1 % of elongation at t_max")
+            self.notes.append("cables without a stiffness in the file are assumed to stretch by 0.1 % at t_max")
         if self.drive == "lengths" and recorded.tensions is None and robot.fixed_lengths is None:
             self.notes.append("lengths do not show friction of the winches: record tensions or motor currents for that")
         none = robot.m * (0.0,)  # parameters of the file

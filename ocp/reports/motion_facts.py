@@ -90,8 +90,7 @@ def _task_wind(task: Task) -> str:
     """Return the task's wind, or its set of winds and the wind of the planned tensions."""
     if isinstance(task.wind, WindDisc):
         most = quantity(task.wind.speed, "m/s")
-        winds = f"any horizontal one up to {most}, to which the audit adds the speed of the platform"
-        return f"{winds}; the tensions shown are those in still air"
+        return f"any horizontal one up to {most}; the tensions shown are those in still air"
     if isinstance(task.wind, WindBox):
         box = task.wind
         return f"any from {wind(box.min)} to {wind(box.max)}; the tensions shown are those in {wind(box.middle)}"
