@@ -167,3 +167,19 @@ def test_a_duration_is_too_short_for_the_thrusts_of_all_carriers_whatever_the_at
     if proof is not None:
         (excess,) = proof.excess
         assert (excess.limit, excess.bound) == ("duration", pytest.approx(seconds / share))
+
+
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_a_load_on_cables_of_fixed_length_cannot_leave_its_carriers_behind(share):
+    """Each goes at least the way of the load less twice its cable's length, soonest with bang-bang control."""
+    robot = load("multi-quadrotor-4")
+    most = robot.carriers[0].acceleration_max
+    way = 10.0 - 2 * robot.fixed_lengths.min() - 2e-4  # lengths are audited within 0.1 mm
+    seconds = share * 2 * np.sqrt(way / most)
+    line = {"kind": "line", "start": [0, 0, 0], "end": [10, 0, 0]}
+    task = {"path": line, "duration": seconds, "steps": 20, "base": {"kind": "free", "ends": "rest"}}
+    proof = infeasible_ends(lay_out(robot, read_task(task | {"tube": {"position": 0.5}})))
+    assert (proof is not None) == (share < 1)
+    if proof is not None:
+        assert {excess.limit for excess in proof.excess} == {"carrier_acceleration"}
+        assert proof.excess[0].value == pytest.approx(most / share**2)

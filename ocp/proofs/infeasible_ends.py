@@ -224,15 +224,22 @@ def _hurried(
     scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
 ) -> Iterator[Excess]:
     """Yield the limits of speeds and accelerations that are exceeded because the duration is too short."""
-    order = np.argsort(times)
+    robot, order = scenario.robot, np.argsort(times)
     which = np.minimum(np.arange(len(times)), 2)  # of `freedom`: start, end, between
     poses = np.concatenate([platform.pose[None], carriers.pose.swapaxes(0, 1)])[:, order]
     spread, centres = np.zeros((len(poses), 3)), np.zeros((2, 3))
     for kind, its in enumerate(freedom):
         spread[:, kind] = np.where((its[:, 0] == FREE).any(axis=1), np.inf, 0.0)
-        for k, point in enumerate((np.zeros(3), np.array(scenario.robot.platform.com))):
+        for k, point in enumerate((np.zeros(3), np.array(robot.platform.com))):
             centres[k, kind] = spread[0, kind] + _reach(scenario, its, point[None])
         spread[0, kind] += _reach(scenario, its)
+    if robot.fixed_lengths is not None:  # no carrier is farther from its attachments than its cables are long
+        far = robot.fixed_lengths + np.linalg.norm(robot.anchors, axis=1) + LENGTH_TOLERANCE
+        attachments = scenario.dynamics.points(platform.pose, carriers.pose)[1][order]
+        for index in np.flatnonzero(np.isinf(spread[1:]).any(axis=1)):
+            own = np.flatnonzero(robot.carrier_of_cable == index)
+            cable = own[far[own].argmin()]
+            poses[1 + index, :, :3], spread[1 + index] = attachments[:, cable], spread[0] + far[cable]
     resting = [np.all(_resting(freedom, platform, carriers, count), axis=0) for count in (3, 6)]
     centres = centres[:, which[order]]
     return too_fast(scenario, times[order], poses, spread[:, which[order]], *resting, centres=centres)
