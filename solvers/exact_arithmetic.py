@@ -15,7 +15,8 @@ the cost by a part in a million, w is known no better than that.
 
 from collections.abc import Sequence
 from fractions import Fraction
-from math import lcm
+from math import gcd, isfinite
+from operator import mul
 
 import numpy as np
 
@@ -44,25 +45,34 @@ def exact_optimum(problem: TensionProblem, nearest: Array) -> Projection:
 
     entries, unit = _integers(problem.scaled_A.ravel().tolist())
     given, wrench_unit = _integers(problem.scaled_w.tolist())
+    weights, weight_unit = _integers(problem.weights.tolist())
+    ends = [*problem.t_min.tolist(), *problem.t_max.tolist()]
+    finite = [value for value in ends if isfinite(value)]
+    tensions, tension_unit = _integers([*problem.t_ref.tolist(), *nearest.tolist(), *finite])
+    scale = max(tension_unit // wrench_unit, 1)
+    newton = scale * wrench_unit  # of tensions as integers
+    tensions = [value * (newton // tension_unit) for value in tensions]
+    wishes, x = tensions[: problem.m], tensions[problem.m : 2 * problem.m]
+    known = dict(zip(finite, tensions[2 * problem.m :], strict=True))
+    limits = [(known.get(low), known.get(high)) for low, high in zip(ends[: problem.m], ends[problem.m :], strict=True)]
     rows = [entries[i * problem.m : (i + 1) * problem.m] for i in range(problem.n)]
     columns = [entries[c :: problem.m] for c in range(problem.m)]
-    squares = [[Fraction(_dot(left, right), unit * unit) for right in columns] for left in columns]
-    along = [Fraction(_dot(column, given), unit * wrench_unit) for column in columns]
-    weights = [Fraction(x) for x in problem.weights.tolist()]
-    t_ref = [Fraction(x) for x in problem.t_ref.tolist()]
-    limits = list(zip(problem.t_min.tolist(), problem.t_max.tolist(), strict=True))
-    x, before = [Fraction(value) for value in nearest.tolist()], np.inf
+    squares = [[_dot(left, right) * weight_unit for right in columns] for left in columns]
+    along = [_dot(column, given) * weight_unit * unit * scale for column in columns]
+    divisor, before = 1, np.inf
     while True:
-        H = [[rho * value for value in row] for row in squares]
-        for i, weight in enumerate(weights):
-            H[i][i] += weight
-        slope = [rho * a + weight * wish for a, weight, wish in zip(along, weights, t_ref, strict=True)]
-        x = minimum_in_box(H, slope, limits, x)
-        t = np.minimum(np.maximum([float(value) for value in x], problem.t_min), problem.t_max)
-        together = lcm(*(value.denominator for value in x))
-        parts = [value.numerator * (together // value.denominator) * wrench_unit for value in x]
-        left = [b * unit * together - _dot(row, parts) for row, b in zip(rows, given, strict=True)]
-        missing = np.array([value / (unit * wrench_unit * together) for value in left])
+        H = [[rho.numerator * value for value in row] for row in squares]
+        slope = [rho.numerator * value for value in along]
+        for i, (weight, wish) in enumerate(zip(weights, wishes, strict=True)):
+            own = rho.denominator * weight * unit * unit
+            H[i][i] += own
+            slope[i] += own * wish
+        common = gcd(*slope, *(value for row in H for value in row))
+        H = [[value // common for value in row] for row in H]
+        x, divisor = minimum_in_box(H, [value // common for value in slope], limits, x, divisor)
+        t = np.minimum(np.maximum([value / (divisor * newton) for value in x], problem.t_min), problem.t_max)
+        left = [b * unit * scale * divisor - _dot(row, x) for row, b in zip(rows, given, strict=True)]
+        missing = np.array([value / (unit * newton * divisor) for value in left])
         error = float(np.linalg.norm(missing))
         if error <= accepted_error(problem, t) or error > 0.5 * before:
             return Projection(t, missing)
@@ -77,57 +87,72 @@ def _integers(values: list[float]) -> tuple[list[int], int]:
 
 
 def _dot(x: Sequence[int], y: Sequence[int]) -> int:
-    return sum(a * b for a, b in zip(x, y, strict=True))
+    return sum(map(mul, x, y))
 
 
 def minimum_in_box(
-    H: list[list[Fraction]], slope: list[Fraction], limits: list[tuple[float, float]], x: list[Fraction]
-) -> list[Fraction]:
-    """Minimise x H x / 2 - slope x for low <= x <= high, from an x inside; H positive definite, limits may be infinite.
+    H: list[list[int]], slope: list[int], limits: list[tuple[int | None, int | None]], x: list[int], divisor: int
+) -> tuple[list[int], int]:
+    """Minimise y H y / 2 - slope y for low <= y <= high, from y = x / divisor inside; return another x and divisor.
 
-    What is free lies strictly between its limits, so each step lowers the cost and no set of free variables returns.
+    H is positive definite; a limit that is None is infinite. What is free lies strictly between its limits, so each
+    step lowers the cost and no set of free variables returns.
     """
-    free = [i for i, (low, high) in enumerate(limits) if low < x[i] < high]
+
+    def at(i: int, upper: bool) -> bool:
+        """Return whether x is at its lower or upper limit."""
+        limit = limits[i][upper]
+        return limit is not None and x[i] == limit * divisor
+
+    free = [i for i in range(len(x)) if not (at(i, False) or at(i, True))]
     while True:
-        fixed = [i for i in range(len(x)) if i not in free]
-        right = [slope[i] - sum(H[i][j] * x[j] for j in fixed) for i in free]
-        target = dict(zip(free, _solved([[H[i][j] for j in free] for i in free], right), strict=True))
-        step = Fraction(1)
-        for i, end in target.items():
-            limit = limits[i][end > x[i]]
-            if (end > limit) if end > x[i] else (end < limit):
-                step = min(step, (Fraction(limit) - x[i]) / (end - x[i]))
-        for i, end in target.items():
-            x[i] += step * (end - x[i])
-        if step < 1:
-            free = [i for i in free if x[i] not in limits[i]]
+        fixed = {i: x[i] // divisor for i in range(len(x)) if i not in free}  # at their limits
+        right = [slope[i] - sum(H[i][j] * limit for j, limit in fixed.items()) for i in free]
+        ends, below = _solved([[H[i][j] for j in free] for i in free], right)
+        # The part of the step up to the first limit, as a numerator and a denominator.
+        part, whole, stopped = 1, 1, False
+        for i, end in zip(free, ends, strict=True):
+            change = end * divisor - x[i] * below
+            limit = limits[i][change > 0]
+            if limit is not None and (end > limit * below if change > 0 else end < limit * below):
+                until = (limit * divisor - x[i]) * below
+                if abs(until) * whole < part * abs(change):
+                    part, whole, stopped = abs(until), abs(change), True
+        x = [value * below * whole for value in x]
+        for i, end in zip(free, ends, strict=True):
+            x[i] += part * (end * divisor - x[i] // whole)
+        divisor *= below * whole
+        common = gcd(divisor, *x)
+        x, divisor = [value // common for value in x], divisor // common
+        if stopped:
+            free = [i for i in free if not (at(i, False) or at(i, True))]
             continue
         # The cost falls fastest, for its curvature, along the one that is freed.
         gain = {}
         for i in fixed:
-            down = slope[i] - sum(H[i][j] * x[j] for j in range(len(x)))
-            low, high = limits[i]
-            if (down > 0 and x[i] < high) or (down < 0 and x[i] > low):
-                gain[i] = down * down / H[i][i]
+            down = slope[i] * divisor - _dot(H[i], x)
+            if down and not at(i, down > 0):
+                gain[i] = down * down // H[i][i]
         if not gain:
-            return x
+            return x, divisor
         free = sorted([*free, max(gain, key=lambda i: gain[i])])
 
 
-def _solved(matrix: list[list[Fraction]], right: list[Fraction]) -> list[Fraction]:
-    """Solve a positive definite system by elimination on integers (Bareiss 1968): no fraction, no common divisors."""
-    rows = []
-    for row, value in zip(matrix, right, strict=True):
-        together = [*row, value]
-        denominator = lcm(*(each.denominator for each in together))
-        rows.append([int(each * denominator) for each in together])
-    size, before = len(rows), 1
-    for k in range(size):
-        for i in range(size):
-            if i != k:
-                rows[i] = [
-                    (rows[k][k] * value - rows[i][k] * top) // before if j > k else 0
-                    for j, (value, top) in enumerate(zip(rows[i], rows[k], strict=True))
-                ]
-        before = rows[k][k]
-    return [Fraction(row[-1], before) for row in rows]
+def _solved(matrix: list[list[int]], right: list[int]) -> tuple[list[int], int]:
+    """Solve a positive definite system by elimination on integers (Bareiss 1968); return x and what divides all of it.
+
+    What is left of the matrix stays symmetric, so only its upper triangle is kept.
+    """
+    size, before = len(right), 1
+    rows = [[*row[i:], value] for i, (row, value) in enumerate(zip(matrix, right, strict=True))]
+    for k, top in enumerate(rows):
+        for i in range(k + 1, size):
+            factor = top[i - k]
+            rows[i] = [
+                (top[0] * value - factor * above) // before for value, above in zip(rows[i], top[i - k :], strict=True)
+            ]
+        before = top[0]
+    x: list[int] = []
+    for row in reversed(rows):
+        x.insert(0, (before * row[-1] - _dot(row[1:-1], x)) // row[0])
+    return x, before

@@ -41,17 +41,15 @@ def test_the_conditions_hold_in_fractions(seed, size, unlimited):
     """The gradient is exactly zero inside the limits and points out of them at the limits: the one minimum."""
     rng = np.random.default_rng(seed)
     root = rng.integers(-4, 5, (size, size + 1))
-    H = [[Fraction(int(x)) for x in row] for row in root @ root.T + np.eye(size, dtype=int)]
-    slope = [Fraction(int(x), 3) for x in rng.integers(-20, 21, size)]
-    low = rng.integers(-3, 1, size).astype(float)
-    high = low + rng.integers(0, 4, size)
-    if unlimited:
-        high[rng.random(size) < 0.5] = np.inf
-    start = [Fraction(x) for x in low.tolist()]
-    x = minimum_in_box(H, slope, list(zip(low.tolist(), high.tolist(), strict=True)), start)
+    H = (root @ root.T + np.eye(size, dtype=int)).tolist()
+    slope = rng.integers(-20, 21, size).tolist()
+    low = rng.integers(-3, 1, size).tolist()
+    high = [None if unlimited and rng.random() < 0.5 else each + int(rng.integers(0, 4)) for each in low]
+    x, divisor = minimum_in_box(H, slope, list(zip(low, high, strict=True)), list(low), 1)
+    x = [Fraction(value, divisor) for value in x]
     for i in range(size):
         gradient = sum((H[i][j] * x[j] for j in range(size)), -slope[i])
-        assert low[i] <= x[i] <= high[i]
+        assert low[i] <= x[i] <= (np.inf if high[i] is None else high[i])
         assert gradient == 0 or low[i] == high[i] or (x[i] == low[i] if gradient > 0 else x[i] == high[i])
 
 
