@@ -277,6 +277,12 @@ def test_wrong_calls_are_refused(unit):
     for step in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(Exception, match="fmi3DoStep"):
             one.step(0.0, step)
+    # Cables above and below a platform, without stiffness: no pose has all lengths if one cable is shorter.
+    closed = unit("ipanema-1", "plant", "lengths")
+    closed.step(0.0, STEP)
+    closed.set(["command.length[1]"], [float(closed.variables["command.length[1]"].start) - 1e-3])
+    with pytest.raises(Exception, match="fmi3DoStep"):
+        closed.step(STEP, STEP)
     with pytest.raises(Exception, match="fmi3GetFloat64"):
         one.slave.getFloat64([10**6])
     one.slave.guid = "of another unit"

@@ -34,6 +34,14 @@ static void begin_command(plant *p, motion *now, const double *row, const double
     take_command(p, now, period);
 }
 
+/* Return whether no pose has the lengths: a cable without stiffness is longer than its own after all impacts. */
+static int is_torn(const plant *p) {
+    for (int i = 0; i < p->cables && p->kind == CONSTRAINED; i++) {
+        if (is_intact(p, i) && p->cable[i].stretch > TORN_LENGTH * p->robot->length_scale) { return 1; }
+    }
+    return 0;
+}
+
 /* Run one row: its state, commands, and places in the history. */
 static void run_row(plant *p, const towline_run *run, const double *state, const double *commands, double *history,
                     double *tensions) {
@@ -48,6 +56,7 @@ static void run_row(plant *p, const towline_run *run, const double *state, const
         begin_command(p, &now, row, k + 1 < run->commands ? row + width : NULL, run->period);
         for (int32_t s = 0; s < run->substeps; s++) {
             begin_contacts(p, &now, &memory.slope[0], step * s);
+            if (is_torn(p)) { now.body[0].position[0] = NAN; }
             if (s == 0 && k % run->keep == 0) {
                 record_state(p, &now, history + k / run->keep * size);
                 record_tensions(p, tensions + k / run->keep * p->cables);
@@ -62,6 +71,7 @@ static void run_row(plant *p, const towline_run *run, const double *state, const
         record_state(p, &now, history + run->steps / run->keep * size);
         begin_contacts(p, &now, &memory.slope[0], run->period);
         record_tensions(p, tensions + run->steps / run->keep * p->cables);
+        if (is_torn(p)) { history[run->steps / run->keep * size] = NAN; }
     }
 }
 

@@ -119,6 +119,7 @@ static const double NO_LENGTH = 1e-12; /* [m] of a cable that has no direction, 
 static const double CAUGHT_LENGTH = 1e-13;   /* by which one is longer when its impact is located */
 static const double TOUCHING_LENGTH = 1e-12; /* by which one may be short of taut to be treated as taut */
 static const double RESTING_LENGTH = 1e-9;   /* the same for one that hardly moves: its tension's sign decides */
+static const double TORN_LENGTH = 1e-5;      /* by which none is longer if its length is possible */
 static const double STILL = 1e-12; /* [m/s] with which a taut one stretches without an impact: what rounding leaves */
 /* [m/s] with which a taut one gets slack; a slower one is held, which ends trains of ever smaller impacts. */
 static const double PARTING = 1e-6;

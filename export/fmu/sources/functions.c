@@ -114,7 +114,9 @@ FMI3_FUNCTION fmi3Status fmi3DoStep(fmi3Instance it, fmi3Float64 time, fmi3Float
     *last_time = time;
     if (self->unit.mode != UNIT_STEPPING) { return refuse(self, "steps are allowed in step mode only"); }
     if (!towline_unit_step(&self->unit, time, step)) {
-        return refuse(self, "the motion diverges, use smaller steps; or the step is not a positive time");
+        return refuse(self,
+                      "the motion diverges, use smaller steps; or no pose has the commanded lengths of cables "
+                      "without stiffness; or the step is not a positive time");
     }
     *last_time = self->unit.time;
     return fmi3OK;
