@@ -5,8 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..limits.carriers import CarrierAcceleration, CarrierSpeed
 from ..tasks.deviation import Deviation
 from ..tasks.ends import fixed_values
+from ..tasks.paths import Motion
 from ..tasks.scenario import POSITION, Scenario
 from .formation import clear_formation
 
@@ -52,16 +54,38 @@ def balanced(scenario: Scenario, guess: Deviation) -> Deviation:
 
 
 def _about_home(scenario: Scenario, nodes: np.ndarray) -> Deviation:
-    """Return the deviation that keeps carriers which may go anywhere about the platform as at home."""
+    """Return the deviation that keeps carriers which may go anywhere about the platform as at home.
+
+    Those that are not fast enough follow a share of its motion, about the middle of its path.
+    """
     robot, loose = scenario.robot, [] if scenario.relative else scenario.loose
     q, v, a = np.zeros((3, len(nodes), scenario.count))
     platform, carriers = scenario.references(nodes)
+    shares = {carrier: _followed(scenario, carrier, platform) for carrier in loose}
     for column, (owner, coordinate) in enumerate(scenario.owners()):
-        if owner is not None and owner in loose and coordinate in POSITION:
+        if owner is not None and owner in shares and coordinate in POSITION:
+            share, path = shares[owner], platform.pose[:, coordinate]
             for part, its, own in zip((q, v, a), platform, carriers[owner], strict=True):
-                part[:, column] = its[:, coordinate] - own[:, coordinate]
+                part[:, column] = share * its[:, coordinate] - own[:, coordinate]
+            q[:, column] += (1 - share) * (path.min() + path.max()) / 2
             q[:, column] += robot.carrier_home[owner, coordinate] - robot.home[coordinate]
     return Deviation(nodes, q, v, a, np.zeros((len(nodes), robot.m)))
+
+
+def _followed(scenario: Scenario, carrier: int, platform: Motion) -> float:
+    """Return the share of the platform's motion that a carrier follows, from 1 to 0 as it can follow all to half of it.
+
+    A guess on or beyond limits of speed and acceleration takes several times as many iterations, or has no solution.
+    Cables of constant length make the carrier follow all of it, and a longer duration makes all of it slower.
+    """
+    if scenario.robot.fixed_lengths is not None or scenario.duration_range is not None:
+        return 1.0
+    able, name = 1.0, scenario.robot.carriers[carrier].name
+    for limit in scenario.limits:
+        if isinstance(limit, CarrierSpeed | CarrierAcceleration) and limit.is_about(name):
+            peak = float(np.linalg.norm(platform[limit.derivative][:, :3], axis=1).max())
+            able = min(able, limit.high / peak if peak > 0.0 else 1.0)
+    return max(2 * able - 1, 0.0)
 
 
 def _spline(scenario: Scenario, nodes: np.ndarray, q: np.ndarray) -> Deviation:
