@@ -33,6 +33,7 @@ LEAST = 1.7  # times that carriers need at their largest acceleration: the rate 
 COARSE, FINE, APART = 24, 150, 0.01  # instants of an attempt, and at most of the result; [s] between those, at least
 SMOOTHED = 0.03  # [s], over which tilt is smoothed: a plan's jerk jumps between its nodes
 LONGER, AGAIN = 1.03, 3  # at least, and how often: what broke a limit in between takes longer
+LITTLE = 0.03  # of a limit's range: what breaks it by more takes the next duration that was tried
 TINY, RANK = 1e-12, 1e-9  # of a matrix
 TILTS = 3  # times that positions are computed from tilts, which follow from accelerations
 INSTANT = 1e-4  # [s], for differences of attitudes
@@ -84,13 +85,18 @@ def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Team
     durations, best = durations[durations < left], None
     if len(durations):
         excess = np.array([each for each, _ in _Stops(robot, trajectory, begins, durations, COARSE).worst])
-        duration = float(durations[np.argmax(excess <= CLOSE * excess.min())])
+        kept = durations[excess <= CLOSE * excess.min()]
+        duration = float(kept[0])
         # With more instants more is exceeded: where no attempt keeps the limits, the result does not either.
-        for _ in range(AGAIN if excess.min() == 0 else not rests):
+        for tried in range(AGAIN if excess.min() == 0 else not rests):
             count = int(np.clip(duration / APART, 10, FINE))
             found = _Stops(robot, trajectory, begins, np.array([duration]), count).only()
             best = found if best is None or found.excess < best.excess else best
-            duration *= max(np.sqrt(1.0 + found.excess), LONGER)  # accelerations are as its inverse square
+            after = kept[kept > duration]
+            if len(after) and (tried or found.excess > LITTLE):
+                duration = float(after[0])
+            else:
+                duration *= max(np.sqrt(1.0 + found.excess), LONGER)  # accelerations are as its inverse square
             if best.excess == 0 or duration >= min(left, longest):
                 break
     return _remainder(robot, trajectory, begins) if best is None or (rests and best.excess > 0) else best

@@ -254,6 +254,17 @@ def test_a_team_with_more_cables_than_it_needs_keeps_the_tensions_of_its_plan():
     np.testing.assert_allclose(its.tensions, np.tile(tensions, (len(its.times), 1)), atol=1e-6)
 
 
+def test_robots_that_have_hardly_begun_to_move_do_not_follow_their_plan_to_its_end():
+    """Also where the shortest stop of those that are tried first is beyond limits between its instants."""
+    robot = load("flycrane")
+    end = robot.home + np.array([-0.2, 0.1, 0.1, 0, 0, 0])
+    line = {"kind": "line", "start": robot.home.tolist(), "end": end.tolist()}
+    found = plan(robot, {"path": line, "duration": 1.0, "base": {"kind": "free"}, "steps": 12})
+    for its in (stop(found, time) for time in np.arange(0, 0.05, 0.01)):
+        assert its.feasible
+        assert its.duration < 0.5 * found.duration
+
+
 def with_winches(name):
     """Return a ring of six cables below one quadrotor, three quadrotors with a winch each, or one and the ground."""
     data = load("multi-quadrotor-3" if name == "team" else "wang-flying-quadrotor").model_dump(mode="json")
