@@ -23,6 +23,7 @@ from ..limits import Limit, Rate
 from ..tasks.ends import AT_REST, fixed_values
 from ..tasks.paths import Motion
 from ..tasks.scenario import ATTITUDE, Scenario
+from .blocked_tube import blocked_tube
 from .no_attitude import CERTAIN, no_attitude
 from .no_cycle import no_cycle
 from .out_of_reach import out_of_reach
@@ -80,6 +81,7 @@ def infeasible_ends(scenario: Scenario) -> InfeasibleEnds | None:
         certificate = _beyond_reach(scenario, times, freedom, platform, carriers)
     if not proven and certificate is None:
         proven += _at_no_attitude(scenario, times, freedom, platform, carriers) or no_cycle(scenario)
+        proven += blocked_tube(scenario, platform.pose[:2], lambda k, point: _reach(scenario, freedom[k], point[None]))
     return InfeasibleEnds(proven, certificate) if proven or certificate is not None else None
 
 
