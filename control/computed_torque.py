@@ -22,7 +22,7 @@ from .controllability import uncontrolled
 from .controller import Controller
 from .deviation import Deviation
 from .fallback import NEGLIGIBLE, answer_others
-from .lag import WINCHES_KEEP, Lead, RotorLead
+from .lag import ROTORS_KEEP, WINCHES_KEEP, Lead, RotorLead
 from .late_states import OLDEST, LateStates
 from .noise import Noise
 from .one_at_a_time import OneAtATime
@@ -140,9 +140,11 @@ class ComputedTorque(Controller):
         self._slow_loops = SlowLoops(self._settings, bandwidth is None, usual.bandwidth)
         self._usual_longest = self._slow_loops.longest
         loop, lag = number("tension_loop", tension_loop, 0.0, 1e3), number("tension_lag", tension_lag, 0.0, 1.0)
-        has_lead = lag > WINCHES_KEEP and self.robot.fixed_lengths is None
-        self._ahead = Lead(lag, WINCHES_KEEP, *self._limits) if has_lead else None
-        self._loop = TensionLoop(loop, 0.0 if has_lead else WINCHES_KEEP, *self._limits) if loop else None
+        left = WINCHES_KEEP
+        if self.robot.fixed_lengths is not None:  # tensions are late by what is left of the lag of the thrusts
+            lag, left = min(rotors, ROTORS_KEEP), 0.0
+        self._ahead = Lead(lag, left or ROTORS_KEEP, *self._limits) if lag > left else None
+        self._loop = TensionLoop(loop, WINCHES_KEEP if self._ahead is None else 0.0, *self._limits) if loop else None
         self._little = np.maximum(self._limits.low, SOMETHING * self._limits.high)
         self._boxes = boxes(self.robot) if far.any() else None
         self._robot, self._carried = record_of(self.robot), CarriedLoad(self.robot)
@@ -194,7 +196,6 @@ class ComputedTorque(Controller):
         self._seen, self._sent_lately = 0.0, LateStates(rows * m)
         self._late: np.ndarray | None = None  # motions when they were measured, if that is not now
         self._accelerations = bytes(8 * rows * count * 6)  # of carriers, as ordered last
-        self._last = bytes(8 * rows * m)  # tensions that were commanded last
         self._otherwise = np.zeros((rows, m))  # measured minus commanded tensions, over the age of states [N]
         self._measured, self._wanted = np.zeros((rows, 1 + count, 12)), np.zeros((rows, 18))
         self._carriers = np.zeros((rows, count, 3, 6))  # how they should move
@@ -230,7 +231,6 @@ class ComputedTorque(Controller):
             simple = self._is_plain and self._is_one and not self._is_missing
             if simple and not self._are_far:  # the rest, at a fifth of the time
                 tensions = problems.tensions[0].copy()
-                self._last = tensions.tobytes()
                 ordered: Any = reference.carrier_acceleration  # any array that the core can read
                 self._accelerations = memoryview(ordered).tobytes()
                 return Command(tensions, *reference[3:6], *self._is_as_planned)
@@ -277,9 +277,8 @@ class ComputedTorque(Controller):
             self._speed_up()
         own, scales = (self._robot, self._settings), (self._problems.length, *self._deviation.most)
         if self._ahead is not None:
-            self._ahead.pass_time(dt, self._cables["last"])
-            self._last = self._cables["last"].tobytes()
-        observes = self._carried.is_later(seen)
+            self._ahead.pass_time(dt, self._cables["given"])
+        given, observes = self._cables["given"].tobytes(), self._carried.is_later(seen)
         fixed = dt, since if observes else 0.0, *scales, solves
         if time - seen <= ROUNDING and since == dt and observes:
             try:
@@ -287,7 +286,7 @@ class ComputedTorque(Controller):
             except (ValueError, TypeError, BufferError):  # they need not be arrays of float64, which the core reads
                 state, reference = self._as_floats(state, reference)
                 done = control_step(*fixed, state, reference, *own, None, *self._arrays)
-            self._sent_lately.remember(self._last, dt)
+            self._sent_lately.remember(given, dt)
             self._late = None
         else:
             state, reference = self._as_floats(state, reference)
@@ -297,7 +296,7 @@ class ComputedTorque(Controller):
             # would make the loop unstable if the true age differed.
             share = min(since / age, 1.0) if age > ROUNDING else 1.0
             self._otherwise += share * (cables["known"] - cables["then"] - self._otherwise)
-            self._sent_lately.remember(self._last, dt, state.tensions, reference.tensions)
+            self._sent_lately.remember(given, dt, state.tensions, reference.tensions)
             self._sent_lately.commanded(cables, age, since, dt, self._senses)
             models = self._carried.records_between(seen, time)
             memory = self._measured, self._otherwise, self._platform["disturbance"], self._accelerations
@@ -314,8 +313,8 @@ class ComputedTorque(Controller):
 
     def _agree(self, sender: "ComputedTorque") -> None:
         """Take over the command that another controller of the same robot has sent, as if it were the own one."""
-        self._cables["last"], self._actuation[:] = sender._cables["last"], sender._actuation
-        self._last, self._accelerations = sender._last, sender._accelerations
+        self._cables["last"], self._cables["given"] = sender._cables["last"], sender._cables["given"]
+        self._actuation[:], self._accelerations = sender._actuation, sender._accelerations
         self._platform["attitude"] = sender._platform["attitude"]
         self._of_carriers["ordered"] = sender._of_carriers["ordered"]
         if sender._lead is not None and self._lead is not None:
@@ -350,7 +349,7 @@ class ComputedTorque(Controller):
             tensions = np.where(self.cut, self._little, tensions)  # so that one that is not cut reports it
             unheard = (self._platform["silent"] > 1) & ((answered == PLANNED) | (answered == SHIFTED))
             answered = np.where(unheard, SOFT, answered).astype(np.int8)
-        self._cables["last"], self._last = tensions, tensions.tobytes()
+        self._cables["last"] = self._cables["given"] = tensions
         carriers = self._carriers.copy()
         if answered is not self._as_planned:
             self._go_on(carriers)

@@ -143,7 +143,7 @@ class Predictive(ComputedTorque):
         self._beside = ComputedTorque(the_robot, reach=given, sensors=sensors, rotor_lag=rotor_lag, **loops)
         loops |= {"tension_loop": tension_loop, "tension_lag": tension_lag, "rotor_lag": rotor_lag}
         super().__init__(the_robot, observer=own.observer, reach=reach, **loops)
-        self._known_age = self._beside._known_age
+        self._known_age, self._beside._ahead = self._beside._known_age, None  # drives do not follow its commands
         set_reach(self._settings, reacts)
         self._followed, self._far = np.flatnonzero(flies & ~far.any(axis=1)), (far, flies)
         # Cables of a fixed length have the tensions that carriers make of them, whatever is commanded.
@@ -251,7 +251,7 @@ class Predictive(ComputedTorque):
         if self.handed_over is None:
             self._compare(time, dt, reference)
         if self._ahead is not None:
-            self._beside._agree(self)  # what the winches have made of the last command
+            self._beside._agree(self)  # what the drives have made of the last command
         self._beside._turning = None if self.handed_over is None else self._turning  # of the orders that are sent
         beside = self._beside.step(time, state, reference)
         unexplained = np.array(self._watch.unexplained)

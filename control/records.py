@@ -26,7 +26,7 @@ CONTROLLER = np.dtype(
 )
 CABLE = np.dtype(
     [
-        *((name, "f8") for name in ("measured", "last", "known", "then", "reported", "commanded", "excess")),
+        *((name, "f8") for name in ("measured", "last", "given", "known", "then", "reported", "commanded", "excess")),
         ("is_cut", "i8"),
     ]
 )

@@ -37,7 +37,8 @@ typedef struct {
 /* What is known of one cable; tensions in newtons. */
 typedef struct {
     double measured;  /* until the state was measured, by a sensor or else as commanded */
-    double last;      /* commanded last */
+    double last;      /* commanded last, */
+    double given;     /* and what drives that lag made of it on average */
     double known;     /* what the observers know of the measured tension */
     double then;      /* commanded until the state was measured */
     double reported;  /* the measured tension, */

@@ -179,10 +179,10 @@ static Py_ssize_t count_far(const double *measured, Py_ssize_t motions, const do
     return rows - near;
 }
 
-/* Take it that the command of the last step has acted since then, and was delivered if nothing is `sensed`. */
+/* Take it that what drives gave since the last step acted, and was delivered if nothing is `sensed`. */
 static void hear_command(towline_cable_memory *cables, Py_ssize_t count, int sensed) {
     for (Py_ssize_t i = 0; i < count; i++) {
-        cables[i].then = cables[i].last;
+        cables[i].then = cables[i].given;
         cables[i].measured = sensed ? cables[i].measured : cables[i].then;
     }
 }
@@ -273,7 +273,7 @@ TOWLINE_PY(control_step) {
     if (solves && m <= TOWLINE_CABLES) { optimal = solve_all(at, rows, robot->cables, numbers[LENGTH], solves > 1); }
     for (Py_ssize_t i = 0; i < rows * m; i++) {
         missing += cables[i].is_cut != 0;
-        cables[i].last = optimal == rows ? at.tensions[i] : cables[i].last;
+        if (optimal == rows) { cables[i].last = cables[i].given = at.tensions[i]; }
     }
     for (Py_ssize_t row = 0; row < rows; row++) {
         missing += ((const towline_platform_memory *)(const void *)of[PLATFORM])[row].silent > 1;
