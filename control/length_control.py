@@ -231,11 +231,11 @@ class LengthControl(Controller):
         shape = (*measured.shape, 6)
         pose, velocity, acceleration = (np.array(np.broadcast_to(part, shape)) for part in reference[:3])
         self._past.append((time, (pose, velocity, acceleration)))
-        while len(self._past) > 1 and self._past[1][0] <= max(float(measured.min()), time - MEMORY):
+        while len(self._past) > 1 and self._past[1][0] <= max(float(measured.min(initial=time)), time - MEMORY):
             self._past.pop(0)
         at = np.searchsorted([begins for begins, _ in self._past[1:]], measured, side="right")
-        if (at == at.flat[0]).all():
-            begins, motion = self._past[int(at.flat[0])]
+        if (at == (first := int(at.max(initial=0)))).all():
+            begins, motion = self._past[first]
             return moved_on(motion, (measured - begins)[..., None])
         motions = [np.stack([self._past[k][1][part][row] for row, k in enumerate(at)]) for part in range(3)]
         since = measured - np.array([self._past[k][0] for k in at])
@@ -267,7 +267,7 @@ class LengthControl(Controller):
             turned, attitude = (rotations(one[..., 3:]) for one in (pose, state.pose))
             error, between = pose - state.pose, turned @ attitude.swapaxes(-1, -2)
             error[..., 3:] = axial(between)
-            behind = np.zeros(1)  # planned minus measured speeds of the cables, (..., m) [m/s]
+            behind = np.zeros((*error.shape[:-1], 1))  # planned minus measured speeds of the cables, (..., m) [m/s]
             if lead:
                 wanted, measured = (velocity * free)[..., None], (state.velocity * free)[..., None]
                 seen_at = np.where(np.isfinite(state.pose), state.pose, pose)  # what is missing is not `known` below

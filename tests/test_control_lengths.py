@@ -192,17 +192,20 @@ def test_rows_are_as_alone(model, motion):
 
 
 def test_robots_of_a_batch_have_poses_of_their_own_ages(model, motion):
-    """Poses that are held tell their age, also beside robots whose poses changed at other times, or that have none."""
+    """Poses that are held tell their age, also beside robots whose poses changed at other times, or end."""
     together, alone = LengthControl(model), [LengthControl(model) for _ in range(4)]
     still = np.zeros(6), model.carrier_home, np.zeros_like(model.carrier_home)
     wanted = references(motion, 0.02)[:30]
     for k, reference in enumerate(wanted):
-        poses = [wanted[max(k - (k + row) % 5, 0)].pose for row in range(3)] + [np.full(6, np.nan)]
+        poses = [wanted[max(k - (k + row) % 5, 0)].pose for row in range(3)]
+        poses.append(reference.pose + (1e-3 if k < 10 else np.nan))
         both = together.step(0.02 * k, State(np.stack(poses), *(np.stack([one] * 4) for one in still)), reference)
         for row, controller in enumerate(alone):
             one = controller.step(0.02 * k, State(poses[row], *still), reference)
             np.testing.assert_allclose(wound(both)[row], wound(one), rtol=1e-13)
             assert both.answered[row] == one.answered
+    nobody = State(np.zeros((0, 6)), *(np.zeros((0, *one.shape)) for one in still))
+    assert wound(LengthControl(model).step(0.0, nobody, reference)).shape == (0, 8)
 
 
 def test_angles_are_compared_round_the_circle(model):
