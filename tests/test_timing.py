@@ -397,13 +397,14 @@ def test_an_arc_of_many_chords_is_timed():
     assert timing.feasible, timing.reason  # tensions are missing in a few bends: only there is the grid refined
 
 
-def test_what_no_time_law_changes_ends_the_search():
+def test_a_path_below_the_floor_is_infeasible_at_any_speed():
     robot = point_mass([[2, 2, 3], [-2, 2, 3], [-2, -2, 3], [2, -2, 3]], ["x", "y", "z"])
     below = robot.model_copy(update={"floor": 0.1})
     timing = time_along(below, along({"kind": "line", "start": [0, 0, 0.5], "end": [0.5, 0, 0]}))
-    assert timing.status is MotionStatus.NOT_FOUND
-    assert timing.reason == "the path exceeds limits at any speed"
-    assert "floor" in str(timing.audit.excess[0])
+    assert timing.status is MotionStatus.INFEASIBLE
+    (excess,) = timing.audit.excess
+    assert (excess.limit, excess.value) == ("floor", pytest.approx(-0.1))
+    assert time_along(below, along({"kind": "line", "start": [0, 0, 0.5], "end": [0.5, 0, 0.1]})).feasible
 
 
 def test_corners_and_dwells_are_rests_of_the_fastest_law():

@@ -107,7 +107,8 @@ class FastestLaw(Displayed):
         margin: Distance of every tension from its limits [N].
         s: Grid, (n,), the fraction of the path's own time, from 0 to 1.
         sd: ds/dt on the grid, (n,) [1/s]; nan without a time law.
-        at: Without a time law: s of the certificate, or where the search ended.
+        at: Without a feasible time law: s of the certificate, where the path itself exceeds a limit, or where the
+            search ended.
         certificate: If infeasible: proof that at `at` no tensions inside their limits give the required wrench at any
             speed and acceleration (at the ends: at rest). It belongs to `problem` and has the largest shortfall along
             the grid.

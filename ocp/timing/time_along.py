@@ -17,8 +17,10 @@ from ...base.inputs import whole_number
 from ...models import Robot
 from ...models.files import AnyRobot, as_robot
 from ..audits.audit import Audit, audit
-from ..audits.excess import TENSIONS
+from ..audits.excess import TENSIONS, Excess
+from ..limits.bodies import Inside
 from ..limits.cables import WinchForce
+from ..limits.carriers import CarrierReach
 from ..limits.limits import Limits
 from ..limits.platform import ZoneSpeed
 from ..plan import Plan
@@ -37,6 +39,7 @@ from ..tasks.paths import (
     TimedPath,
     WaypointPath,
 )
+from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
 from ..tasks.task import GivenBase, Task, read_task
 from .fastest_law import FastestLaw
@@ -63,6 +66,7 @@ MOST_CUTS = 24  # times that half-planes of motors are added
 PIECES = (400, 800, 1600)  # of a spline through points of a path, until it is near enough
 LOOKS = 20_001
 ON_PATH = 2e-6  # of a path's length: how far that spline may be off
+SURE = 5 * ON_PATH  # of it: what is beyond a limit by more is so on the path itself
 
 
 def time_along(robot: AnyRobot, task: Task | dict[str, Any] | str | os.PathLike[str], *, grid: int = 200) -> Plan:
@@ -89,9 +93,10 @@ def time_along(robot: AnyRobot, task: Task | dict[str, Any] | str | os.PathLike[
     Returns:
         Plan: Audited like every plan. Its task contains the time law, so `plan` audits the same motion again; `law`
             contains the active limit on each part of the path (`bottlenecks`). If infeasible, no tensions inside their
-            limits give the required wrench at `law.at` at any speed and acceleration (at the ends: at rest). The motion
-            then has no time law: it only shows the path, and lasts 10 s. If not-found, every grid point allows some
-            speed, but no time law connects them, or none passes the audit.
+            limits give the required wrench at `law.at` at any speed and acceleration (at the ends: at rest); the motion
+            then has no time law: it only shows the path, and lasts 10 s. Or the path itself leaves the room, the floor
+            or the reach of a carrier (`audit.excess`). If not-found, every grid point allows some speed, but no time
+            law connects them, or none passes the audit.
 
     Raises:
         InputError: If an argument is invalid, the task does not fit the robot or has keys that a time law along a path
@@ -155,17 +160,17 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
         audited = audit(scenario, None)
         if audited.passed:
             return Plan(scenario, MotionStatus.FEASIBLE, None, audited, 0.0, 0.0, law=law)
+        if beyond := _off_limits(scenario, audited):
+            law = replace(law, at=float(law.path.law(np.array([beyond[0].time]))[0][0]))
+            audited = replace(audited, excess=beyond, certificate=None)
+            return Plan(scenario, MotionStatus.INFEASIBLE, None, audited, 0.0, 0.0, law=law)
         missing = _missing(law, audited)
         # What motors lack, a reserve makes up for, as for missing wrenches.
         known = (each for each in audited.excess if each.limit in KNOWN_LIMITS and each.limit != WinchForce.name)
         excess = max([0.0, *(each.value / each.bound - 1.0 for each in known)])
-        changeable = any(each.limit in (TENSIONS, *KNOWN_LIMITS) for each in audited.excess)
-        path_alone = len(missing.newtons) == 1 and not changeable  # it exceeds what no time law changes
-        if attempts == ATTEMPTS or path_alone:
+        if attempts == ATTEMPTS:
             law = replace(law, at=float(law.path.law(audited.times[[audited.worst]])[0][0]))
-            reason = f"no time law passed the audit in {attempts} attempts"
-            if path_alone:
-                reason = "the path exceeds limits at any speed"
+            reason = f"no time law passed the audit in {ATTEMPTS} attempts"
             return Plan(scenario, MotionStatus.NOT_FOUND, None, audited, 0.0, 0.0, reason, law=law)
         # A grid too coarse for a bend misses it by so much that as large a reserve would leave no tension at all.
         if splits < MOST_SPLITS and missing.newtons.max() > COARSE * weight:
@@ -214,13 +219,24 @@ def _timed(task: Task, law: FastestLaw) -> Task:
 def _shown(task: Task, law: FastestLaw) -> Plan:
     """Return the plan of a path without a time law: a motion that shows the path, and what is known of it."""
     scenario = lay_out(law.parametrised.robot, _timed(task, law))
-    audited = replace(audit(scenario, None, to_show=True), excess=[], certificate=None)
-    if law.certificate is None:
+    audited = audit(scenario, None, to_show=True)
+    audited = replace(audited, excess=_off_limits(scenario, audited), certificate=None)
+    if law.certificate is not None:
+        at = float(law.path.time_at(np.array([law.at]))[0])
+        audited = replace(audited, certificate=replace(law.certificate, time=at))
+    elif not audited.excess:
         reason = f"no time law connects the points of the path; the search ended at s = {law.at:.4g}"
         return Plan(scenario, MotionStatus.NOT_FOUND, None, audited, 0.0, 0.0, reason, law=law)
-    at = float(law.path.time_at(np.array([law.at]))[0])
-    audited = replace(audited, certificate=replace(law.certificate, time=at))
     return Plan(scenario, MotionStatus.INFEASIBLE, None, audited, 0.0, 0.0, law=law)
+
+
+def _off_limits(scenario: Scenario, audited: Audit) -> list[Excess]:
+    """Return where the path itself exceeds limits, at any speed, by more than a spline may be off its points."""
+    names = {limit.name for limit in scenario.limits if isinstance(limit, Inside | CarrierReach)}
+    steps = np.diff(audited.motion.pose, axis=0)
+    moved = np.linalg.norm(steps[:, :3], axis=1) + scenario.robot.length * np.linalg.norm(steps[:, 3:], axis=1)
+    least = SURE * moved.sum()
+    return [each for each in audited.excess if each.limit in names and abs(each.value - each.bound) > least]
 
 
 class _Stretches(NamedTuple):
