@@ -117,7 +117,7 @@ class FaultTolerant(Controller):
                 lost = lost_carrier(self.robot, self._team.disturbance_of_carriers[0])
             if self.lost is not None or lost is None:
                 return command
-            self._lose(time, lost, state, reference)
+            self._lose(float(time), lost, state, reference)
             if self._rest is None:
                 return command
         else:

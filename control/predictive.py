@@ -244,7 +244,7 @@ class Predictive(ComputedTorque):
 
     @override
     def _step(self, time: float, state: State, reference: Reference) -> Command:
-        dt, state, reference = self._measure(time, state, reference)
+        (dt, state, reference), time = self._measure(time, state, reference), float(time)
         if np.ndim(state.pose) != 1:
             raise InputError(f"state must be of one robot, got {len(self._wanted)} of them")
         reference = as_floats(reference, self.robot, None)

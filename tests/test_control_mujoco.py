@@ -160,6 +160,7 @@ def test_predictions_that_do_not_come_true_are_given_up(circle, case):
     standard = fly(task, ComputedTorque(task.robot, reach=task.reach), **WINCHES[case])
     assert controller.handed_over.time < 0.25
     first = int(np.flatnonzero(flown.answered == OTHERWISE)[0])
+    assert type(controller.handed_over.time) is float  # although references have times of NumPy
     assert first == round(controller.handed_over.time / 1e-3)
     assert (flown.answered[first:] == OTHERWISE).all()
     assert flown.error[-300:].max() < 1.2 * standard.error[-300:].max()
