@@ -422,6 +422,15 @@ def test_fully_constrained_cables_without_stiffness_hold_the_platform():
     assert np.abs(plant.read(run.states).pose - robot.home).max() < 1e-9
     w = Dynamics(robot).required_wrench(robot.home, np.zeros(6), np.zeros(6))
     assert Dynamics(robot).wrench_matrix(robot.home) @ run.tensions[-1] == pytest.approx(w, abs=1e-6)
+    # Cables above and below the platform: no pose has all lengths if one cable is shorter by anything.
+    for shorter in (1e-6, 1e-3):
+        lengths = lengths_at(robot) - shorter * np.eye(8)[0]
+        with pytest.raises(SolverError, match="give the cables a stiffness if no pose has the commanded lengths"):
+            plant.run(plant.start(), held(plant, 100, lengths), 1e-3)
+    # With play, no cable is longer than its length.
+    slacker = lengths_at(robot) + np.random.default_rng(1).uniform(1e-4, 1e-3, 8)
+    run = plant.run(plant.start(lengths=slacker), held(plant, 100, slacker), 1e-3)
+    assert (Dynamics(robot).cable_lengths(plant.read(run.states).pose) <= slacker + 1e-9).all()
 
 
 def test_wrong_input_is_one_line():
