@@ -17,6 +17,7 @@ from towline.estimation.calibration.geometry import length_of
 from towline.estimation.calibration.normal_equations import NormalEquations, metric
 from towline.estimation.calibration.parameters import OF_CABLE
 from towline.estimation.calibration.solving import model_of
+from towline.estimation.logs.pose_track import PoseTrack
 from towline.estimation.logs.smoothing import Parabolas
 from towline.models import Dynamics, Robot, load
 from towline.solvers import solve_batch
@@ -260,6 +261,30 @@ def test_of_an_oversampled_log_some_samples_are_used(monkeypatch):
     assert f"from {len(samples)} samples of a longer log" in found.report()
     shaken = log.changed(poses=measured + 0.01 * np.sin(0.25 * np.arange(count))[:, None])
     assert representative.representative(robot, shaken) is None
+
+
+def test_long_rests_hide_neither_a_motion_nor_how_fast_it_is():
+    """Of 2000 s, the robot moves for 20 s in one part: slowly, or too fast for every second sample."""
+    draw, robot, times = np.random.default_rng(4), load("planar-4"), 0.01 * np.arange(200_000)
+    moves = (times > 911) & (times < 931)
+    spacings = []
+    for rate in (1.0, 20.0):
+        swing = 0.1 * moves[:, None] * np.sin(rate * np.outer(times, [0.5, 0.7, 0.9, 1.1]))
+        lengths = 3 + swing + draw.normal(0, 3e-4, (200_000, 4))
+        log = Measurements(lengths, times=times, sigma={"lengths": 3e-4})
+        assert moves[representative._blocks(log)].sum() > 1800
+        spacings.append(representative._spacing(robot, log))
+    assert spacings == [2, 1]
+
+
+def test_poses_between_samples_have_the_variance_of_poses_at_samples():
+    """Otherwise the offset of a clock would be wrong by up to half a sample, where poses vary least."""
+    draw, times = np.random.default_rng(0), 0.01 * np.arange(4_000)
+    noise = draw.normal(0, 1e-3, (4_000, 3)) + np.sin(times)[:, None]
+    track = PoseTrack(times, noise, np.tile(np.eye(3), (4_000, 1, 1)), np.ones(4_000, dtype=bool), None)
+    at, between = (np.var(track.at(clock)[0][:-1] - np.sin(times[:-1] + clock)[:, None]) for clock in (0.0, 0.005))
+    assert between == pytest.approx(at, rel=0.004)
+    assert at < 0.3e-6
 
 
 def test_no_parabola_extends_over_a_pause():

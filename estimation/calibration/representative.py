@@ -14,6 +14,8 @@ from .motion import SLOWEST
 MANY = 100_000  # samples of a log, of which all are used
 LEAST = 0.5  # of the stated standard deviations: a smaller noise does not matter
 BLOCKS, BLOCK = 20, 1000  # of successive samples where forces count, which take far longer
+CHANCE = 4.0  # standard deviations of a ratio of roughnesses, at most 1 / sqrt(n) each
+THIN = 10  # samples apart, those that show what a block is like
 
 
 def representative(robot: Robot, measurements: Measurements) -> np.ndarray | None:
@@ -27,13 +29,25 @@ def representative(robot: Robot, measurements: Measurements) -> np.ndarray | Non
         return None
     rows = np.arange(0, count, _spacing(robot, measurements)) if count > MANY else np.arange(count)
     if len(rows) > 2 * BLOCKS * BLOCK and (measurements.tensions is not None or hangs(robot, measurements)):
-        rows = rows[_blocks(len(rows))]
+        rows = rows[_blocks(measurements.only(rows))]
     return rows if len(rows) < count else None
 
 
-def _blocks(count: int) -> np.ndarray:
-    """Return the samples of blocks that are spread over a log, (k,)."""
-    return (np.linspace(0, count - BLOCK, BLOCKS).astype(int)[:, None] + np.arange(BLOCK)).ravel()
+def _blocks(log: Measurements) -> np.ndarray:
+    """Return the samples of blocks, (k,): half of these are spread over a log, and half differ most from the others.
+
+    Otherwise a motion between long rests, for example, or another load might be missed.
+    """
+    whole, given = len(log) // BLOCK, [one for one in (log.lengths, log.poses, log.tensions) if one is not None]
+    values = np.dstack([one[: whole * BLOCK].reshape(whole, BLOCK, -1)[:, ::THIN] for one in given])
+    shown = np.hstack(list(np.quantile(values, (0.1, 0.5, 0.9), axis=1)))  # wrong readings are few
+    shown = np.nan_to_num((shown - shown[0]) / np.maximum(np.ptp(shown, axis=0), 1e-12))
+    chosen = np.linspace(0, whole - 1, BLOCKS // 2).astype(int)
+    while len(chosen) < BLOCKS:
+        apart = np.linalg.norm(shown[:, None] - shown[chosen], axis=2).min(axis=1)  # (whole,)
+        apart[chosen] = -1.0
+        chosen = np.append(chosen, np.argmax(apart))
+    return (np.sort(chosen)[:, None] * BLOCK + np.arange(BLOCK)).ravel()
 
 
 def _spacing(robot: Robot, measurements: Measurements) -> int:
@@ -41,7 +55,7 @@ def _spacing(robot: Robot, measurements: Measurements) -> int:
 
     Parabolas through neighbours that are twice as far apart then hardly deviate from them, compared with the noise.
     """
-    some, given = measurements.only(_blocks(len(measurements))), measurements.sigma
+    some, given = measurements.only(_blocks(measurements)), measurements.sigma
     assert some.times is not None
     arm = max(float(np.linalg.norm(robot.attachments, axis=1).max()), 1e-9)
     of_pose = np.repeat([given.lengths, given.lengths / arm], 3)
@@ -52,7 +66,11 @@ def _spacing(robot: Robot, measurements: Measurements) -> int:
     each, stated = map(np.hstack, zip(*pairs, strict=True))
     known = np.isfinite(each).all(axis=0)
     each = each[:, known]
-    most = ROUGHER * np.maximum(roughness(some.times, each), LEAST * stated[known])
+    usual = np.maximum(roughness(some.times, each, moving=True), LEAST * stated[known])
     wanted = min(-(-len(measurements) // MANY), int(SLOWEST / np.median(np.diff(some.times))))
-    fits = (n for n in range(wanted, 1, -1) if (roughness(some.times[:: 2 * n], each[:: 2 * n]) <= most).all())
-    return next(fits, 1)
+    for n in range(wanted, 1, -1):
+        fewer = slice(None, None, 2 * n)
+        most = ROUGHER + CHANCE / np.sqrt(len(each[fewer]))
+        if (roughness(some.times[fewer], each[fewer], moving=True) <= most * usual).all():
+            return n
+    return 1

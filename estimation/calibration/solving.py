@@ -103,7 +103,7 @@ class Solved(Displayed):
             return Noise(np.nan, 1.0, redundancy, seen.covariance, seen.information)
         excess = float(np.sqrt(max(self.fit.cost - float(((moved / sigmas) ** 2).sum()), 0.0) / redundancy))
         M, more = information_of(model, state, V * roots, np.eye(seen.rank) - D)
-        larger = max(1.0, excess) ** 2
+        larger = max(1 / more, excess**2)  # smoothing of poses makes their noise smaller, but autocorrelated
         shares, turn = np.linalg.eigh((V / roots).T @ seen.covariance @ (V / roots))
         wide = (turn * np.sqrt(np.maximum(shares, 0.0))) @ turn.T
         M = larger * M + D + out_of_plane(model, state, V * roots)
@@ -308,7 +308,7 @@ def model_of(
         if track is None:
             position, rotation, _ = measured_poses(robot, measurements)
             assert measurements.times is not None
-            track = PoseTrack(measurements.times, position, rotation, tracked(robot, measurements))
+            track = PoseTrack(measurements.times, position, rotation, tracked(robot, measurements), None)
         carriers = None if measurements.carrier_poses is None else CarrierMotion(robot, measurements)
         model = replace(model, track=track, carriers=carriers)
     elif np.isinf(model.pose_sigmas[:, :3]).any():
@@ -384,7 +384,7 @@ def lengths_of(model: Model, state: State) -> np.ndarray:
 
 def inflation_of(noise: Noise) -> float:
     """Return the factor of a covariance without priors, for residuals larger than stated, or autocorrelated."""
-    return max(1.0, noise.excess) ** 2 * noise.autocorrelation  # an excess that is nan leaves 1
+    return max(1.0, float(np.nan_to_num(noise.excess)) ** 2 * noise.autocorrelation)
 
 
 def covariance_of(solved: Solved) -> np.ndarray:

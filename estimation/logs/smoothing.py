@@ -12,8 +12,9 @@ MOST = 25
 NEIGHBOURS = 5  # samples of a parabola
 LEFT = 17 / 35  # of the variance of noise, by parabolas through five samples
 LONGEST = 0.5  # [s] of a parabola
+APART = 5  # samples to each side, between which a motion is seen
 PART = 20_000  # samples that are smoothed together
-PAUSE = 10.0  # median times between samples, over which no parabola extends
+PAUSE, LONG = 10.0, 1.0  # median times between samples, and [s], over which no parabola extends if both are exceeded
 ROUGHER = 1.1  # times their noise: what samples may deviate from the smooth curve through them
 
 
@@ -50,12 +51,13 @@ class Parabolas:
     """Parabolas by least squares through `width` neighbours of each sample, at times (N,) [s].
 
     Samples before and after a pause are no neighbours, unless those between two pauses are too few for a parabola.
-    They are computed for some samples at a time: those of a million samples would take more than a gigabyte.
+    If `fading`, farther neighbours count less (Hann window). They are computed for some samples at a time: those of a
+    million samples would take more than a gigabyte.
     """
 
-    def __init__(self, times: np.ndarray, width: int):
-        self._times, self._width, count = times, width, len(times)
-        pauses = np.flatnonzero(np.diff(times) > PAUSE * np.median(np.diff(times))) + 1
+    def __init__(self, times: np.ndarray, width: int, fading: bool = False):
+        self._times, self._width, self._fading, count = times, width, fading, len(times)
+        pauses = np.flatnonzero(np.diff(times) > max(PAUSE * float(np.median(np.diff(times))), LONG)) + 1
         ends = np.concatenate([[0], pauses, [count]])
         sizes = np.diff(ends)
         self._first = np.repeat(np.where(sizes < width, 0, ends[:-1]), sizes)  # neighbour that each sample may have
@@ -70,6 +72,9 @@ class Parabolas:
         unit = np.abs(apart).max(axis=1, keepdims=True)
         basis = np.stack([np.ones_like(apart), apart / unit, (apart / unit) ** 2], axis=2)
         transposed = np.swapaxes(basis, 1, 2)
+        if self._fading:
+            far = np.minimum(np.abs(rows - at[:, None]) / (width // 2 + 1), (width // 2) / (width // 2 + 1))
+            transposed = transposed * (np.cos(np.pi / 2 * far) ** 2)[:, None]
         return _Part(rows, unit, np.linalg.solve(transposed @ basis, transposed))
 
     def _parts(self) -> Iterator[_Part]:
@@ -118,19 +123,35 @@ def noise_of(times: np.ndarray, values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(roughness(times, values) ** 2) / (1 - LEFT)))
 
 
-def widest_parabola(times: np.ndarray, values: np.ndarray) -> int:
-    """Return through how many neighbours parabolas smooth values (n, d) without deviating beyond their noise."""
+def widest_parabola(times: np.ndarray, values: np.ndarray, most: int = 51, moving: bool = False) -> int:
+    """Return through how many neighbours parabolas smooth values (n, d) without deviating beyond their noise.
+
+    `most` is the largest number, `moving` as for `roughness`.
+    """
     if len(times) <= NEIGHBOURS:
         return NEIGHBOURS
     apart = float(np.median(np.diff(times)))
-    noise = np.maximum(roughness(times, values) / np.sqrt(1 - LEFT), 1e-12)
+    noise = np.maximum(roughness(times, values, moving=moving) / np.sqrt(1 - LEFT), 1e-12)
     for n in (51, 31, 21, 15, 11, 7):
-        if n * apart <= LONGEST and len(times) >= 4 * n and (roughness(times, values, n) <= ROUGHER * noise).all():
+        if n > most or n * apart > LONGEST or len(times) < 4 * n:
+            continue
+        if (roughness(times, values, n, moving) <= ROUGHER * noise).all():
             return n
     return NEIGHBOURS
 
 
-def roughness(times: np.ndarray, values: np.ndarray, neighbours: int = NEIGHBOURS) -> np.ndarray:
-    """Return by how much values (n, d) deviate from parabolas through so many neighbours, (d,), robustly."""
+def roughness(times: np.ndarray, values: np.ndarray, neighbours: int = NEIGHBOURS, moving: bool = False) -> np.ndarray:
+    """Return by how much values (n, d) deviate from parabolas through so many neighbours, (d,), robustly.
+
+    If `moving`, samples count by how fast the values change: long rests would hide what the motion is like.
+    """
     half = neighbours // 2
-    return 1.4826 * np.median(np.abs(values - smooth(times, values, neighbours))[half:-half], axis=0)
+    off = 1.4826 * np.abs(values - smooth(times, values, neighbours))[half:-half]
+    if not moving:
+        return np.median(off, axis=0)
+    at, last = np.arange(half, half + len(off)), len(values) - 1
+    steps = np.abs(values[np.minimum(at + APART, last)] - values[np.maximum(at - APART, 0)])
+    order = np.argsort(off, axis=0)
+    reached = np.cumsum((steps / np.maximum(steps.mean(axis=0), 1e-300)).sum(axis=1)[order], axis=0)
+    median = np.take_along_axis(order, (reached < reached[-1] / 2).sum(axis=0)[None], axis=0)
+    return np.take_along_axis(off, median, axis=0)[0]
