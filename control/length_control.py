@@ -58,8 +58,9 @@ class LengthControl(Controller):
             to 4 and 10, with which no oscillation of the platform on its cables grows (control/length_gains.py). It
             depends on the largest age of the measured pose (from its `time`, or else from `sensors`), and is 0 for
             cables with no damping. If poses are late and have no `time`, pass `sensors` or the gains: the default gains
-            are for current poses, and oscillations would grow. A pose without `time` is taken to be as old as the
-            sensors' delay plus the time since the pose last changed (at most 0.2 s), and compared with the plan then.
+            are for current poses, and oscillations would grow. The age of a pose without `time` is assumed to be the
+            delay of the sensors plus the time since the pose last changed (at most 0.2 s), and the pose is compared
+            with the plan of that earlier time.
         most: Largest correction of a length [m]; default: 5 % of `Robot.length`, but at least 0.5 % of the longest
             cable, about as much as that cable may stretch. At this value the integral stops, and the status is "hold".
         sensors: Errors and delay of the sensors, a `simulation.Noise` or a mapping (default: unknown). The default of P
@@ -168,9 +169,9 @@ class LengthControl(Controller):
     def step(self, time: float, state: State, reference: Reference) -> Command:
         """Return the lengths for the time from `time` [s] on, with the planned tensions and motion of the carriers.
 
-        The correction needs the pose of the state, and with a lag its velocity; without these, the last one stays, and
-        from 0.2 s on the status is "hold". A state is compared with the plan at its time; a pose that is older than 1 s
-        is treated as missing, with the status "hold" at once.
+        The correction needs the pose of the state, and with a lag its velocity. If they are missing, the last
+        correction is kept, and after 0.2 s the status is "hold". A state is compared with the plan at its time; a pose
+        that is older than 1 s is treated as missing, with the status "hold" at once.
 
         Raises:
             InputError: If an argument has a wrong shape or value, the lengths of the reference overflow, or no tensions

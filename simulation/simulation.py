@@ -171,7 +171,7 @@ class Simulation(SimulationData, MotionResult, Reported):
             words = "tensions gave less than the required wrench"
             happened.append(Occurrence(float(self.times[lacking[0]]), "soft", words))
         text = sentence(sorted(happened, key=lambda event: event.at))
-        return "; ".join(filter(None, [text, (differs := self._differs()) and f"differs from its file by {differs}"]))
+        return "; ".join(filter(None, [text, (differs := self._differs()) and f"differs from its file: {differs}"]))
 
     def _differs(self) -> str:
         """Return how the robot of this run differed from its file, in words; empty if it did not."""

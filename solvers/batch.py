@@ -35,8 +35,8 @@ class BatchSolution(Displayed):
         code: Status of each row as a small integer, shape (...); `statuses[code]` is the `Status`.
         residual: Wrench error |S (A t - w)| [N], shape (...); nan without tensions.
         direction: Verified wrench direction that proves infeasibility, shape (..., n), scaled as in `Certificate`; nan
-            for feasible rows. Along it the shortfall exceeds the tolerance, but it is not always the largest possible
-            one, which `solution(index).certificate` has.
+            for feasible rows. Along it the shortfall exceeds the tolerance. Along the direction of
+            `solution(index).certificate`, the shortfall is as large as possible.
         shortfall, support: d . w - h(d) [N] and h(d) [N] along that direction, shape (...); nan elsewhere.
         time: Wall time of the call [s].
         problem: A, w, t_min, t_max, t_ref, weights and length, broadcast. Float64 arrays are views of the arguments: do

@@ -110,7 +110,7 @@ def test_runs_draw_robots_by_their_seeds(crane):
     worst = alone[int(many["error_max"].values.argmax())]
     assert short["worst_seed"] == worst.seed
     first = worst.times[np.argmax(worst.error > 0.002)]
-    assert f"seed {worst.seed}: the error exceeded 2 mm at {first:.4g} s; differs from its file by geometry" in text
+    assert f"seed {worst.seed}: the error exceeded 2 mm at {first:.4g} s; differs from its file: geometry" in text
     assert f"{wrong.sum()} by position error" in text
     only = simulate(robot, robot.home, seed=5, duration=0.2, mismatch={"geometry": True})
     exact = simulate(robot.drawn(1, 5)[0], robot.home, ComputedTorque(robot), duration=0.01)

@@ -67,8 +67,9 @@ class PoseFilter(Displayed):
             constant biases `rate_bias` [rad/s] and `acceleration_bias` [m/s^2]. Default: 1 mm, 1 mm, 1 mrad,
             0.01 rad/s, 0.1 m/s^2, 2 %, 2 %, 0.02 rad/s, 0.2 m/s^2.
         jerk: Densities of the white jerk [m/s^2.5] and [rad/s^2.5]: standard deviations of the change of acceleration
-            in a second, relative to a reference if there is one. Default: 10 m/s^2.5, and that over the robot's
-            `length`. With less jerk the filter is slower, and its estimates less noisy; see `control.Filtered`.
+            in a second, relative to a reference if there is one. Default: 10 m/s^2.5, and 10 m/s^2.5
+            divided by the robot's `length`. With less jerk the filter is slower, and its estimates less noisy; see
+            `control.Filtered`.
         sensor: Position of the inertial sensor in the platform frame, (3,) [m]; its axes are those of the platform.
 
     Raises:
