@@ -72,3 +72,11 @@ def test_a_body_off_the_origin_is_what_passes():
     beside = {"kind": "box", "min": [-0.02, -0.1, 0], "max": [0.02, 0.5, 2]}
     assert proof(beside, body) is not None
     assert proof(beside) is None
+
+
+def test_a_quick_way_over_a_wall_after_a_long_rest_is_seen():
+    """The way over the wall takes a thousandth of the motion, and ends close to where it begins."""
+    over = {"kind": "waypoints", "points": [[-0.25, 0, 1], [0, 0, 3.5], [0.25, 0, 1]], "dwell": [200, 0, 0]}
+    quick = task({"kind": "box", "min": [-0.02, -2, -1], "max": [0.02, 2, 2.6]}) | {"path": over, "duration": 200.1}
+    body = {"kind": "sphere", "centre": [0, 0, 0], "radius": BALL}
+    assert infeasible_ends(lay_out(robot(body), read_task(quick))) is None

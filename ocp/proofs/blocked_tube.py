@@ -21,7 +21,8 @@ from ..limits.clearance import point_outside
 from ..limits.places import PlatformOutside
 from ..tasks.scenario import Scenario
 
-INSTANTS = 1001
+INSTANTS = 1001  # at least
+LONGEST = 0.01  # [s] between instants: nothing passes round a region in less, after a dwell of an hour either
 CERTAIN = 1e-5  # [m]: distances are rounded, and audits accept less
 AROUND = np.pi / 4 * np.arange(8)  # corners of a polygon around a disc
 
@@ -39,7 +40,8 @@ def blocked_tube(scenario: Scenario, ends: np.ndarray, reach: Callable[[int, np.
     soft = PlatformOutside.name in task.limits.soft
     if not places or soft or scenario.relative or not np.isfinite(task.tube.radius):
         return []
-    poses = scenario.motion(np.linspace(0.0, scenario.duration, INSTANTS), None)[0].pose
+    times = np.linspace(0.0, scenario.duration, max(INSTANTS, int(scenario.duration / LONGEST) + 2))
+    poses = scenario.motion(times, None)[0].pose
     points, body = np.vstack([robot.platform.com, robot.attachments]), robot.platform.body
     if body is not None:
         points = skeleton(body).corners.mean(axis=0, keepdims=True)
@@ -54,9 +56,8 @@ def blocked_tube(scenario: Scenario, ends: np.ndarray, reach: Callable[[int, np.
                 plane = f"plane with normal ({quantity_row(found.normal + 0.0)}) through the region's centre"
                 why = f"at least, wherever in the tube it crosses the {plane}"
                 about = f"{'platform' if body is None else PLATFORM} outside {place.name}"
-                time = found.row / (INSTANTS - 1) * scenario.duration
                 value = found.distance - inside
-                return [Excess(PlatformOutside.name, about, time, value, least, "m", "at least", why)]
+                return [Excess(PlatformOutside.name, about, float(times[found.row]), value, least, "m", "at least", why)]
     return []
 
 
