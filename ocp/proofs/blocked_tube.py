@@ -56,8 +56,8 @@ def blocked_tube(scenario: Scenario, ends: np.ndarray, reach: Callable[[int, np.
                 plane = f"plane with normal ({quantity_row(found.normal + 0.0)}) through the region's centre"
                 why = f"at least, wherever in the tube it crosses the {plane}"
                 about = f"{'platform' if body is None else PLATFORM} outside {place.name}"
-                value = found.distance - inside
-                return [Excess(PlatformOutside.name, about, float(times[found.row]), value, least, "m", "at least", why)]
+                time, value = float(times[found.row]), found.distance - inside
+                return [Excess(PlatformOutside.name, about, time, value, least, "m", "at least", why)]
     return []
 
 
