@@ -17,10 +17,11 @@ from towline.estimation.calibration.geometry import length_of
 from towline.estimation.calibration.model import Model, State
 from towline.estimation.calibration.normal_equations import metric
 from towline.estimation.calibration.parameters import OF_CABLE, Parameters
-from towline.estimation.calibration.solving import model_of
+from towline.estimation.calibration.solving import model_of, usual
 from towline.estimation.logs.pose_track import PoseTrack
 from towline.models import Dynamics, Robot, load, points
 from towline.models.cables.pulley import exit_points
+from towline.models.files import as_robot
 from towline.models.rotation import rotation
 
 from .framed import framed
@@ -201,6 +202,11 @@ def test_locked_cables_leave_scale_and_offset_open():
         for i, text in enumerate(sorted(result.not_identifiable))
     )
     np.testing.assert_allclose(result.lengths(readings[0]), truth.mean(axis=0), atol=1e-6)
+    # Nor do they show a clock offset if they only change in a pause.
+    late = np.arange(1000) >= 500
+    wound = Measurements(readings + 0.5 * late[:, None], poses, times=t + late)
+    assert usual(as_robot(robot), wound) == ("anchors", "offsets")
+    assert "clock" in usual(as_robot(robot), wound.changed(lengths=truth))
 
 
 def test_the_schur_complement_finds_what_a_sparse_solver_finds():

@@ -18,7 +18,7 @@ from towline.estimation.calibration.normal_equations import NormalEquations, met
 from towline.estimation.calibration.parameters import OF_CABLE
 from towline.estimation.calibration.solving import model_of
 from towline.estimation.logs.pose_track import PoseTrack
-from towline.estimation.logs.smoothing import Parabolas
+from towline.estimation.logs.smoothing import Polynomials
 from towline.models import Dynamics, Robot, load
 from towline.solvers import solve_batch
 
@@ -291,7 +291,7 @@ def test_no_parabola_extends_over_a_pause():
     """The last two samples are too few for parabolas of their own."""
     t = np.concatenate([0.1 * np.arange(30), 50 + 0.1 * np.arange(20), [90.0, 90.1]])
     values = np.where(t < 10, t**2, 7 - 3 * (t - 50) ** 2)[:, None]
-    fitted = Parabolas(t, 9).fitted(values)
+    fitted = Polynomials(t, 9).fitted(values)
     np.testing.assert_allclose(fitted.bends[:50, 0], np.where(t < 10, 2.0, -6.0)[:50], rtol=1e-6)
     assert np.isfinite(fitted.bends).all()
 

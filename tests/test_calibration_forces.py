@@ -18,6 +18,7 @@ from towline.estimation.calibration.autocorrelation import information_of
 from towline.estimation.calibration.balance import FeltTensions
 from towline.estimation.calibration.fit import fit
 from towline.estimation.calibration.model import Model
+from towline.estimation.calibration.motion import motion_of
 from towline.estimation.calibration.normal_equations import NormalEquations
 from towline.estimation.calibration.parameters import COMMON, FRAMES, GROUPS, OF_CABLE, Parameters
 from towline.estimation.calibration.representative import representative
@@ -264,6 +265,28 @@ def test_noise_of_tensions_does_not_make_cables_seem_stiffer():
     assert abs(error.mean()) < 0.1 * 2e-5
     squares = error @ np.linalg.solve(result.covariance[np.ix_(rows, rows)], error)
     assert squares < chi2.ppf(1 - 1e-3, 4)
+
+
+def test_measured_tensions_show_stretch_without_being_asked_for():
+    free = ("anchors", "offsets", "scales", "clock")
+    result = calibrate("planar-4", moving(1, seconds=8)[0], free)
+    assert result.free == ("anchors", "attachments", "offsets", "scales", "clock", "elasticity")
+    compliance = result.parameters[-1]
+    assert abs(compliance.value - 2e-5) < min(3 * compliance.sigma, 0.25 * 2e-5)
+    assert calibrate("planar-4", moving(1, seconds=8, elasticity=0.0)[0], free).free == free
+
+
+def test_accelerations_of_an_oscillation_are_as_large_as_they_are():
+    """Parabolas as wide make them a quarter too small, and the fit of four cables then moves attachments by 30 mm."""
+    t, rate = np.arange(0, 20, 0.02), 2 * np.pi * 1.4
+    noise, poses = np.random.default_rng(0).normal(0, 5e-4, (len(t), 6)), np.zeros((len(t), 6))
+    poses[:, 2], poses[:, 5] = 0.01 * np.sin(rate * t), 0.02 * np.sin(rate * t)
+    lengths = lines(poses[0])[2] + poses[:, 2:3]
+    data = robot_file(ANCHORS, ATTACHMENTS, COM, MASS, [0] * 6)
+    motion = motion_of(Robot.model_validate(data), Measurements(lengths, poses + noise, times=t))
+    shape = np.sin(rate * t) / (np.sin(rate * t) ** 2).sum()
+    assert shape @ (motion.gravity[:, 2] - GRAVITY[2]) == pytest.approx(0.01 * rate**2, rel=0.04)
+    assert shape @ motion.spin[:, 2] == pytest.approx(-0.02 * rate**2, rel=0.04)
 
 
 def test_a_log_does_not_tell_mass_from_gains():

@@ -28,6 +28,7 @@ from .motion import Motion, motion_of
 from .parameters import Parameters
 
 OWN = 2e-3  # of the weight: standard deviation of forces that the model lacks
+LASTING = 1.0  # [s] for which these forces, such as drag, hardly change
 NOISY = 2.0  # times the stated standard deviations, of the noise that tensions of a motion show
 HARDLY = 0.1  # of the mean tension, that of cables which hardly pull
 LEAST_TENSION = 0.1  # of a cable's mean: relative errors of smaller tensions are not smaller
@@ -106,6 +107,17 @@ class _Log:
             return (np.zeros((3, len(self._measurements), self._robot.m)),) * 2
         terms = np.stack([y * motion.signs, motion.signs, y])
         return terms, terms if motion.smooth is None else motion.smooth.values(terms)
+
+    @cached_property
+    def lasting(self) -> float:
+        """Return how many samples of a motion share the forces that the model lacks, 1 if tensions were measured.
+
+        The mean of many samples tells no more than if each had an independent error so many times as large (squared).
+        """
+        times = self._measurements.times
+        if self._measurements.tensions is not None or times is None or not self.motion.sigma.any():
+            return 1.0
+        return max(1.0, 2 * LASTING / float(np.median(np.diff(times))))
 
     @cached_property
     def lost(self) -> np.ndarray:
@@ -217,7 +229,7 @@ class Balance:
         r = (A @ tensions[..., None])[..., 0] + wrench
         inner = A[:, rows] * self._scale[:, None]
         M = np.einsum("nim,nm,njm->nij", inner, variances, inner)
-        own = (noise * OWN * robot.weight) ** 2 + (robot.platform.mass * motion.sigma) ** 2
+        own = self._log.lasting * (noise * OWN * robot.weight) ** 2 + (robot.platform.mass * motion.sigma) ** 2
         M[:, np.arange(len(rows)), np.arange(len(rows))] += np.reshape(own, (-1, 1))
         finite = np.isfinite(M).all() and np.isfinite(r).all()
         root = np.linalg.inv(np.linalg.cholesky(M)) if finite else None

@@ -8,6 +8,7 @@ from ...models.robot import Robot
 from ..logs.alignment import coarse
 from ..logs.measurements import Measurements, measured_poses, tracked
 from ..logs.pose_track import PoseTrack
+from ..logs.smoothing import PAUSE
 from .fit import held
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
@@ -17,6 +18,7 @@ SHARE = 0.25  # of the record, to which the range is limited
 MOST_SAMPLES = 400
 TRIED = 81
 FEWEST = 0.4  # of the samples that must have a pose
+WINDING = 10.0  # standard deviations of readings that change, and so show a clock offset
 SMOOTH = 0.1  # error of a pose between others, as a share of how far poses are apart
 
 
@@ -43,6 +45,22 @@ def begin_with_clock(model: Model, length: float) -> State:
     state = model.begin()
     state.x[model.parameters.clock] = finer[int(np.argmin([_cost_at(without, clock, length) for clock in finer]))]
     return state
+
+
+def is_still(measurements: Measurements) -> bool:
+    """Return whether the readings hardly change, as those of locked winches."""
+    return float(measurements.lengths.std(axis=0).max()) < WINDING * measurements.sigma.lengths
+
+
+def winds(measurements: Measurements) -> bool:
+    """Return whether readings change within a part of the log that has no pauses, and so show a clock offset.
+
+    Cables that are locked again after each pause do not: a wrong offset only moves poses from one part to the next.
+    """
+    assert measurements.times is not None
+    apart = np.diff(measurements.times)
+    pauses = np.flatnonzero(apart > PAUSE * np.median(apart)) + 1
+    return not all(is_still(measurements.only(rows)) for rows in np.split(np.arange(len(measurements)), pauses))
 
 
 def moves_smoothly(robot: Robot, measurements: Measurements) -> bool:

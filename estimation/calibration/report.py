@@ -10,13 +10,13 @@ from ...figures.drawing import Drawing
 from ...figures.report import Part, Report, Section, Table
 from ...models.parsing import to_yaml
 from .balance import hangs
+from .clock import is_still
 from .file_errors import ENDS
 from .geometry import length_of
 from .hanging import slack
 from .left_out import SLACK, left_out
 from .parameters import GROUPS, IN_BALANCE
 from .result import CalibrationData, Parameter, apart
-from .solving import is_still
 from .turning import turning
 
 MOST_LISTED = 12

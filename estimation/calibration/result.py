@@ -16,6 +16,7 @@ from ...models import points
 from ...models.part import LARGEST
 from ...models.robot import Robot
 from ..logs.measurements import Measurements
+from .clock import is_still
 from .cross_validation import HeldOut, compare, poses_fitted
 from .differences import PLAUSIBLE
 from .geometry import length_of
@@ -23,7 +24,7 @@ from .load_changes import load_changes
 from .outliers import Outlier, Slip
 from .parameters import Parameters
 from .plausibility import Mistake
-from .solving import Noise, Solved, covariance_of, inflation_of, is_still, lengths_of
+from .solving import Noise, Solved, covariance_of, inflation_of, lengths_of
 
 EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
 FAR = 5.0  # standard deviations of the prior

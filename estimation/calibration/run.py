@@ -40,7 +40,7 @@ def calibrate(
             radii (of the pulleys), build-up (of cable on the drums), clock (time by which the clock of the poses is
             ahead of the clock of the lengths), frame and body (errors of the frame that poses were measured in, and of
             the platform frame in the measured body), com (CoM of the platform), elasticity (one stiffness for all
-            cables; also estimated if the log of a platform that hangs shows it), and with tensions mass, stiffness,
+            cables; also estimated if the log shows it), and with tensions mass, stiffness,
             capstan (friction as the logarithm of a ratio of tensions), friction (as a force), gains (newtons per unit
             of the tensions, if these are motor currents) and zeros (of load cells; also estimated if the log shows
             some). Default: anchors and offsets, and the clock if times and poses of a motion were measured. Or "auto":

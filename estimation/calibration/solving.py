@@ -17,7 +17,7 @@ from .autocorrelation import information_of
 from .balance import Balance, hangs
 from .carrier_clocks import CarrierClocks, has_carrier_clocks, with_carrier_clocks
 from .carrier_motion import CarrierMotion
-from .clock import CLOCK_RANGE, begin_with_clock, moves_smoothly
+from .clock import CLOCK_RANGE, begin_with_clock, is_still, moves_smoothly, winds
 from .considered import considered
 from .fit import Fit, fit
 from .geometry import length_of
@@ -33,7 +33,6 @@ from .projection import out_of_plane
 from .sightings import sighted
 from .starts import NEAR_THE_FILE, fit_from, level_poses
 
-WINDING = 10.0  # standard deviations of readings that change, and so show a clock offset
 LOOSE, LOOSE_SHARE = 0.1, 0.03  # [m] of standard deviation, and share of the cables' length: files are usually better
 FEWEST_KNOWN, MEDIAN = 3, 0.455  # directions whose changes show the file's errors; median of chi-square with 1 degree
 ROUNDING = 1e-13  # of the largest variance: a direction without any is unobservable, or kept already
@@ -118,12 +117,7 @@ def usual(robot: Robot, measurements: Measurements) -> tuple[str, ...]:
         return ("offsets",)
     groups = ("anchors", "offsets", "clock")
     known = measurements.times is not None and not still and is_enough(robot, measurements, ("clock",))
-    return groups if known and moves_smoothly(robot, measurements) else groups[:-1]
-
-
-def is_still(measurements: Measurements) -> bool:
-    """Return whether the readings hardly change, as those of locked winches."""
-    return float(measurements.lengths.std(axis=0).max()) < WINDING * measurements.sigma.lengths
+    return groups if known and winds(measurements) and moves_smoothly(robot, measurements) else groups[:-1]
 
 
 def is_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ...]) -> bool:
@@ -256,7 +250,9 @@ def _weighed(model: Model, result: Fit, length: float, stretches: bool) -> tuple
         found = find_unbalanced(model, state)
         known = False if model.unbalanced is None else model.unbalanced
         if found is not None and (found[0] != 1.0 or (found[1] != known).any()):
-            noise = float(np.clip(model.noise * found[0], *NOISE_OF_FORCES))
+            # Noise alone does not show how large forces are that the model lacks.
+            least, most = NOISE_OF_FORCES if model.measurements.tensions is not None else (1.0, NOISE_OF_FORCES[1])
+            noise = float(np.clip(model.noise * found[0], least, most))
             clock = float(state.x[model.parameters.clock])
             model = replace(model, noise=noise, unbalanced=found[1], ahead=clock)
         model = _stretched(model, state, length) if stretches else model

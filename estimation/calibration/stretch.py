@@ -1,9 +1,9 @@
-"""`with_stretch` and `is_elastic`: whether cables of unknown stiffness stretch under the weight that hangs from them.
+"""`with_stretch` and `is_elastic`: whether cables of unknown stiffness stretch under their tensions.
 
-Weight and inertia determine the tensions where a platform `hangs`. Errors of the attachments, for example, may look
-like cables of different stiffness, so these are taken to be equal, and attachments to be wrong by a few millimetres.
-The CoM, by which the cables share the weight, is taken to be wrong by a tenth of the attachments' distances. Only then
-do the tensions tell which cables are slack.
+Tensions were measured, or weight and inertia determine them where a platform `hangs`. Errors of the attachments, for
+example, may look like cables of different stiffness, so these are taken to be equal, and attachments to be wrong by a
+few millimetres. Without measured tensions the CoM, by which the cables share the weight, is taken to be wrong by a
+tenth of the attachments' distances. Only then do the tensions tell which cables are slack.
 """
 
 from dataclasses import replace
@@ -20,6 +20,7 @@ from .normal_equations import NormalEquations, metric
 from .parameters import COMMON, GROUPS
 from .solving import Solved, covariance_of
 from .turning import turning
+from .zeros import from_thrusts
 
 POSSIBLE, CERTAIN = 3.0, 4.0  # standard deviations of a compliance: of independent errors, and of all
 UNEXPLAINED = 1.5  # times the stated standard deviation, of residuals that the model does not explain
@@ -30,7 +31,7 @@ LOOSE = 1e-3  # of the readings, which may be of cables that hardly pull
 def with_elasticity(solved: Solved) -> tuple[tuple[str, ...], dict[str, float]]:
     """Return parameters and standard deviations about the file's values with attachments, CoM and elasticity of cables.
 
-    The elasticity is free unless the file has stiffnesses.
+    The elasticity is free unless the file has stiffnesses, and the CoM unless tensions were measured.
     """
     of, groups, prior = solved.model, solved.model.parameters.groups, dict(solved.model.prior)
     turns = turning(of.robot, of.measurements)
@@ -39,7 +40,8 @@ def with_elasticity(solved: Solved) -> tuple[tuple[str, ...], dict[str, float]]:
         groups = (*groups, "attachments")
         prior["attachments"] = usual_error(of)
     arms = of.robot.attachments.std(axis=0)
-    if "com" not in groups and of.forces is not None and of.forces.equations.any() and arms.any():
+    hung = of.measurements.tensions is None
+    if hung and "com" not in groups and of.forces is not None and of.forces.equations.any() and arms.any():
         groups, prior["com"] = (*groups, "com"), OF_COM * float(np.linalg.norm(arms))
     known = of.parameters.compliances(of.parameters.first).any()
     return tuple(name for name in GROUPS if name in groups or (name == "elasticity" and not known)), prior
@@ -49,18 +51,19 @@ def with_stretch(solved: Solved) -> Solved | None:
     """Return a fit after one step with elasticity, if stretch reduces the residuals more than errors do by chance.
 
     Where residuals are far larger than stated, one step may not show it, and an elastic fit must be tried. None also if
-    weight does not determine the tensions, or accelerations are unknown. If the file has stiffnesses, the step includes
-    CoM and attachments instead, and is only taken where residuals are so large.
+    tensions are unknown, or were computed from thrusts, which have errors of their own. If the file has stiffnesses of
+    a platform that hangs, the step has CoM and attachments instead, and is only taken where residuals are so large.
     """
     of, state = solved.model, solved.fit.state
     groups, (more, prior) = of.parameters.groups, with_elasticity(solved)
-    if not groups or "elasticity" in groups or not hangs(of.robot, of.measurements):
+    measured = of.measurements.tensions is not None and not from_thrusts(of.robot)
+    if not groups or {"elasticity", "stiffness"} & {*groups} or not (measured or hangs(of.robot, of.measurements)):
         return None
-    if of.forces is None or not of.forces.motion_is_known:  # which takes longer to know
+    if of.forces is None or not (measured or of.forces.motion_is_known):  # which takes longer to know
         return None
     excess = max(1.0, float(np.nan_to_num(solved.noise.excess)))
     known = "elasticity" not in more
-    if known and (excess < UNEXPLAINED or "com" in groups or "com" not in more):
+    if known and (measured or excess < UNEXPLAINED or "com" in groups or "com" not in more):
         return None
     of = replace(of, felt=carrying(of, state))
     model = replace(of, parameters=replace(of.parameters, groups=more if known else (*groups, "elasticity")))
@@ -91,8 +94,12 @@ def certainty(solved: Solved) -> float:
 
 
 def is_elastic(solved: Solved) -> bool:
-    """Return whether a fit with elasticity shows that cables stretch, or that their stretch shows another CoM."""
-    return solved.fit.converged and certainty(solved) > CERTAIN
+    """Return whether a fit with elasticity shows that cables stretch, or that their stretch shows another CoM.
+
+    Of measured tensions it must explain the residuals, too: errors of load cells may look like a little stretch.
+    """
+    explained = solved.model.measurements.tensions is None or solved.noise.excess < UNEXPLAINED
+    return solved.fit.converged and explained and certainty(solved) > CERTAIN
 
 
 def uses_slack(solved: Solved) -> bool:

@@ -12,7 +12,7 @@ from .field import Field
 from .mapping import Fields, LogMap, carrier_fields, command_fields
 from .measurements import Measurements
 from .recording import Recording, Samples
-from .smoothing import FEWEST, Parabolas, continuous, within
+from .smoothing import FEWEST, Polynomials, continuous, within
 from .streams import Reader, at_times
 from .thrust_gains import notes as notes_of_gains
 from .thrust_gains import thrust_gains
@@ -71,7 +71,7 @@ def pulls_by_thrust(
     known = np.asarray(np.isfinite(thrusts).all(axis=0))
     if times is None or len(times) <= 2 * FEWEST or len(set(owner)) < len(owner) or not known[owner].all():
         return None
-    gains, parabolas = thrust_gains(robot, measured, poses, thrusts), Parabolas(times, within(times))
+    gains, parabolas = thrust_gains(robot, measured, poses, thrusts), Polynomials(times, within(times))
     notes += notes_of_gains(robot, gains, "so tensions are computed without this error")
     notes.append("tensions are computed from thrusts, weights and accelerations of the carriers")
     thrust_per_newton = {one.index: one.of(times) for one in gains}

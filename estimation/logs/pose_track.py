@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...models import points
-from .smoothing import NEIGHBOURS, PART, Parabolas, continuous, widest_parabola
+from .smoothing import NEIGHBOURS, PART, Polynomials, continuous, widest_parabola
 
 SHORT = 5000  # samples of a part of a spline, whose coefficients need much memory
 SHARED = 100  # and those beside it: the effect of one on another falls to a quarter from sample to sample
@@ -45,7 +45,9 @@ class PoseTrack:
         values = np.hstack([position[known], quaternions])
         width = neighbours or widest_parabola(measured, values, MOST, moving=True)
         smooth = len(values) >= width
-        self._values = Parabolas(measured, width, neighbours is None).values(values[None])[0] if smooth else values
+        self._values = (
+            Polynomials(measured, width, fading=neighbours is None).values(values[None])[0] if smooth else values
+        )
         self._slopes = slopes_of_spline(measured, self._values)
         self.speed = float(np.sqrt((self._slopes[:, :3] ** 2).sum(axis=1).mean()))  # root mean square [m/s]
         self._last: tuple[float, tuple[np.ndarray, ...]] | None = None

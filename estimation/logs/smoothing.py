@@ -1,4 +1,4 @@
-"""Smooth samples by parabolas through neighbours, no wider than their noise allows: `Parabolas`, `widest_parabola`."""
+"""`Polynomials`, `widest_parabola`: smoothing by polynomials through neighbours, no wider than their noise allows."""
 
 from collections.abc import Iterator
 from functools import cached_property
@@ -19,7 +19,7 @@ ROUGHER = 1.1  # times their noise: what samples may deviate from the smooth cur
 
 
 class Fitted(NamedTuple):
-    """Values, first and second derivatives, (N, d), and the standard deviation of each, (3, d)."""
+    """Values, first and second derivatives, (N, d), and the standard deviation of each, (3, N, d): larger at ends."""
 
     values: np.ndarray
     slopes: np.ndarray
@@ -34,12 +34,12 @@ def continuous(quaternions: np.ndarray) -> np.ndarray:
 
 
 class _Part(NamedTuple):
-    """Parabolas about n samples.
+    """Polynomials about n samples.
 
     Attributes:
-        rows: Samples of each parabola, (n, w).
+        rows: Samples of each polynomial, (n, w).
         unit: Unit of time of each, (n, 1) [s].
-        shares: Coefficients per value of a sample, (n, 3, w).
+        shares: Coefficients per value of a sample, (n, degree + 1, w).
     """
 
     rows: np.ndarray
@@ -47,16 +47,16 @@ class _Part(NamedTuple):
     shares: np.ndarray
 
 
-class Parabolas:
-    """Parabolas by least squares through `width` neighbours of each sample, at times (N,) [s].
+class Polynomials:
+    """Polynomials of a degree by least squares through `width` neighbours of each sample, at times (N,) [s].
 
-    Samples before and after a pause are no neighbours, unless those between two pauses are too few for a parabola.
+    Samples before and after a pause are no neighbours, unless those between two pauses are too few for a polynomial.
     If `fading`, farther neighbours count less (Hann window). They are computed for some samples at a time: those of a
     million samples would take more than a gigabyte.
     """
 
-    def __init__(self, times: np.ndarray, width: int, fading: bool = False):
-        self._times, self._width, self._fading, count = times, width, fading, len(times)
+    def __init__(self, times: np.ndarray, width: int, degree: int = 2, fading: bool = False):
+        self._times, self._width, self._degree, self._fading, count = times, width, degree, fading, len(times)
         pauses = np.flatnonzero(np.diff(times) > max(PAUSE * float(np.median(np.diff(times))), LONG)) + 1
         ends = np.concatenate([[0], pauses, [count]])
         sizes = np.diff(ends)
@@ -70,7 +70,7 @@ class Parabolas:
         rows = np.clip(at - width // 2, self._first[at], self._last[at] - width)[:, None] + np.arange(width)
         apart = self._times[rows] - self._times[at, None]
         unit = np.abs(apart).max(axis=1, keepdims=True)
-        basis = np.stack([np.ones_like(apart), apart / unit, (apart / unit) ** 2], axis=2)
+        basis = (apart / unit)[..., None] ** np.arange(self._degree + 1)
         transposed = np.swapaxes(basis, 1, 2)
         if self._fading:
             far = np.minimum(np.abs(rows - at[:, None]) / (width // 2 + 1), (width // 2) / (width // 2 + 1))
@@ -94,16 +94,17 @@ class Parabolas:
         return np.concatenate(parts, axis=1)
 
     def fitted(self, values: np.ndarray) -> Fitted:
-        """Return values (N, d) as the parabolas have them."""
+        """Return values (N, d) as the polynomials have them."""
         result, spread = np.empty((3, *values.shape)), np.empty((3, len(values)))
         end = 0
         for part in self._parts():
             begin, end = end, end + len(part.rows)
             units = np.hstack([np.ones_like(part.unit), part.unit, part.unit**2 / 2])  # (n, 3)
-            result[:, begin:end] = np.swapaxes(part.shares @ values[part.rows] / units[:, :, None], 0, 1)
-            spread[:, begin:end] = (np.linalg.norm(part.shares, axis=2) / units).T
+            shares = part.shares[:, :3] / units[:, :, None]
+            result[:, begin:end] = np.swapaxes(shares @ values[part.rows], 0, 1)
+            spread[:, begin:end] = np.linalg.norm(shares, axis=2).T
         noise = np.sqrt(((values - result[0]) ** 2).mean(axis=0))
-        return Fitted(result[0], result[1], result[2], np.outer(np.median(spread, axis=1), noise))
+        return Fitted(result[0], result[1], result[2], spread[..., None] * noise)
 
 
 def within(times: np.ndarray, span: float = SPAN) -> int:
@@ -113,7 +114,7 @@ def within(times: np.ndarray, span: float = SPAN) -> int:
 
 def smooth(times: np.ndarray, values: np.ndarray, neighbours: int = NEIGHBOURS) -> np.ndarray:
     """Smooth values (n, d) by least-squares parabolas through each and its nearest neighbours."""
-    return values if len(times) < neighbours else Parabolas(times, neighbours).values(values[None])[0]
+    return values if len(times) < neighbours else Polynomials(times, neighbours).values(values[None])[0]
 
 
 def noise_of(times: np.ndarray, values: np.ndarray) -> float:

@@ -17,7 +17,7 @@ from ...base.text import quantity
 from ...models import points
 from ...models.robot import Robot
 from .measurements import Measurements, measured_poses
-from .smoothing import FEWEST, Parabolas, within
+from .smoothing import FEWEST, Polynomials, within
 
 BLOCKS = 25  # of the record; the scatter of their sums gives the standard deviations, also of autocorrelated residuals
 CLEAR = 5.0  # standard deviations
@@ -55,7 +55,7 @@ def thrust_gains(robot: Robot, measured: Measurements, poses: np.ndarray, thrust
     there = (known | (robot.dof_mask == 0)).all(axis=1) & np.isfinite(poses).all(axis=(1, 2))
     if there.sum() <= 4 * BLOCKS:
         return []
-    parabolas, found = Parabolas(times, within(times)), list[ThrustGain]()
+    parabolas, found = Polynomials(times, within(times)), list[ThrustGain]()
     for cable, index in enumerate(owner):
         carrier = robot.carriers[index]
         used = there & np.isfinite(thrusts[:, index])

@@ -23,7 +23,7 @@ from ..calibration.plausibility import Mistake, mistake
 from ..logs.encoders import lengths_of
 from ..logs.measurements import Measurements, carriers_of, check_measurements
 from ..logs.recording import COUNTED
-from ..logs.smoothing import FEWEST, Parabolas, within
+from ..logs.smoothing import FEWEST, Polynomials, within
 from .estimate import FALSE_ALARM, PoseEstimate, largest_cost
 from .from_lengths import SIGMA, checked_sigma, pose_from_lengths
 from .wrong_lengths import TOLD_APART, can_explain, wrong_cables
@@ -119,7 +119,7 @@ class LogPoses(Displayed):
         estimate, rows = self.estimate, np.asarray(self.estimate.by_gravity)
         if self.times is None or len(self.times) <= 2 * FEWEST or not rows.any():
             return 0.0
-        bends = Parabolas(self.times, within(self.times)).fitted(estimate.pose[:, :3]).bends
+        bends = Polynomials(self.times, within(self.times)).fitted(estimate.pose[:, :3]).bends
         gravity = max(float(np.linalg.norm(estimate.robot.gravity)), 1e-9)
         return float(np.sqrt((bends[rows] ** 2).sum(axis=1).mean()) / gravity * length_of(estimate.robot))
 
