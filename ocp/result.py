@@ -210,7 +210,7 @@ class PlanData(Displayed):
 
     @cached_property
     def infeasible_spans(self) -> tuple[Certificate, ...]:
-        """Return a certificate for each span of time without tensions inside their limits; see `infeasible_spans`."""
+        """Return a certificate for each span of time without tensions inside their limits."""
         return infeasible_spans(self.scenario, self.audit)
 
     @cached_property

@@ -152,8 +152,8 @@ class TensionProblem(Displayed):
         """Return N, shape (m, m - rank): orthonormal columns that span the null space of A.
 
         All tensions that give w, inside the limits or not, are A^+ w + N lambda; `TensionSolution.lambda_` is the
-        lambda of a solution. N is in echelon form: the first cable with an entry in a column has a positive one there,
-        and none in later columns. So it is unique, and the same on every computer. Singular values of S A below 1e-10
+        lambda of a solution. N is in echelon form: the first nonzero entry of each column is positive, and later
+        columns are zero in its row. So N is unique, and the same on every computer. Singular values of S A below 1e-10
         of the largest are treated as zero.
         """
         _, sigma, rows = np.linalg.svd(self.scaled_A)

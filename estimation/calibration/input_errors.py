@@ -20,7 +20,7 @@ class Mistake(NamedTuple):
         corrected: Measurements without it, or None if several errors are equally probable.
         severe: True if a calibration would be wrong, False if it would only mean a frame other than the file's.
         factors: Factors of the readings in `corrected`, (m,) or one for all cables.
-        columns: Columns of the log in the order of the cables, (m,), or None if it is theirs.
+        columns: Column of the log for each cable, (m,); None if the columns are in the order of the cables.
     """
 
     text: str

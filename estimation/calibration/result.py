@@ -141,9 +141,10 @@ class CalibrationData(Displayed):
 
     @cached_property
     def growth(self) -> float | None:
-        """Return by which share the anchors are farther apart than in the file if lengths do not determine it, or None.
+        """Return the fraction by which the anchors are farther apart than in the file; None if log or prior fix it.
 
-        Without positions, a scale of all readings would explain it as well. A prior of the anchors tells.
+        Without measured positions and without a prior of the anchors, a wrong scale of all readings would have the same
+        effect as anchors that are farther apart.
         """
         of, state = self._solved.model, self._solved.fit.state
         named = "anchors" in self.free and "scales" not in self.free and "anchors" not in self.prior

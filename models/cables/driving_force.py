@@ -100,7 +100,7 @@ def driving_force(
     - `pretension`: tension of each cable before the vibration [N], broadcast to (N, m): an element is slack if the
       vibration takes more than this. 0 is the paper's rule, by which dT_K is never negative; `inf` keeps every cable
       taut.
-    - `winding`: "paid out": the winch pays out what the steady motion takes, so that this adds nothing to dT_K.
+    - `winding`: "paid out": the winch pays out cable as the steady motion requires, so winding adds nothing to dT_K.
       "printed": the paper's Eq. 13 to the letter, where each element is lengthened by (l(t + dt) - l(t)) / n in every
       step (the last one repeats); at any usual speed this alone is far more than T.
 

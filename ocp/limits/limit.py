@@ -144,7 +144,7 @@ class Limit(ABC):
 
     @property
     def tightens(self) -> bool:
-        """Return whether a program can tighten the bounds: not of an equation, nor of a convex limit of poses."""
+        """Return whether a program can tighten the bounds; False for equations and for convex limits of poses."""
         return not (self.is_equation or (self.is_convex and self.order == 0))
 
     @property

@@ -40,11 +40,11 @@ class Load(RigidLoad):
 
     @property
     def extremes(self) -> np.ndarray:
-        """Return the loads that decide whether tensions exist for all within the tolerances, (k, 10); k is 0 without.
+        """Return the extreme loads within the tolerances, (k, 10); none without tolerances.
 
-        The wrench of a load is affine in its mass, and in its CoM, if its inertia about the nominal CoM is in
-        proportion to the mass. So each wrench is a weighted mean of the corners' wrenches, and the set of available
-        ones is convex.
+        If tensions exist for these loads, they exist for all within the tolerances. The wrench of a load is affine
+        in its mass, and in its CoM if its inertia about the nominal CoM is proportional to its mass. Each wrench is
+        therefore a weighted mean of the wrenches of the extreme loads, and the available wrench set is convex.
         """
         masses = np.unique([self.mass * (1 - self.mass_tolerance), self.mass * (1 + self.mass_tolerance)])
         offsets = list(product(*(np.unique([-off, off]) + 0.0 for off in self.com_tolerance)))

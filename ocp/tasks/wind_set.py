@@ -72,7 +72,7 @@ class WindBox(Box):
         return x, y, z
 
     def count(self, aero: Aero) -> int:
-        """Return how many winds decide."""
+        """Return the number of winds that decide whether tensions exist in all winds of the set."""
         return len(self._choices(aero))
 
     def decisive(self, aero: Aero, moving: Any, smoothed: float = 0.0) -> list[Any]:
@@ -122,7 +122,7 @@ class WindDisc(Part):
         return 0.0, 0.0, 0.0
 
     def count(self, aero: Aero) -> int:
-        """Return how many winds decide."""
+        """Return the number of winds that decide whether tensions exist in all winds of the set."""
         return 8 + _has_kinks(aero)
 
     def decisive(self, aero: Aero, moving: Any, smoothed: float = 0.0) -> list[Any]:

@@ -88,13 +88,13 @@ class FeedPath(PathBase):
 
     @cached_property
     def curve(self) -> RoundedCorners:
-        """Return the curve, by its length."""
+        """Return the curve with its corners rounded, as a function of the length along it."""
         stops = np.array(self.dwell or np.zeros(len(self.points))) > 0
         return RoundedCorners(np.array(self.points)[:, :3], self.tolerance, stops | (self.tolerance == 0))
 
     @cached_property
     def law(self) -> TimeLaw:
-        """Return the length over time."""
+        """Return the length along the curve as a function of time."""
         curve, a = self.curve, self.acceleration
         nodes, curvature = _cells(curve)
         feed = self._feed_at((nodes[1:] + nodes[:-1]) / 2)

@@ -225,7 +225,7 @@ class WaypointPath(PathBase):
 
     @override
     def by_fraction(self, s: np.ndarray, until: float | None = None) -> Motion:
-        """Return pose and derivatives by s: for legs the share of their length, or with `times` of the time."""
+        """Return pose and derivatives by s: for legs, the fraction of their length or, with `times`, of the time."""
         return super().by_fraction(s, until) if self.shape == "spline" else self._legs.by_fraction(s)
 
     @override
