@@ -26,7 +26,7 @@ class PoseTrack:
     - `times`: increasing, (N,) [s].
     - `position`, `rotation`: (N, 3) [m], (N, 3, 3).
     - `known`: samples at which the pose was measured, (N,) of bool; at least four.
-    - `neighbours`: number of samples of a parabola; None: up to 11, fading, if the motion allows.
+    - `neighbours`: number of samples of a parabola; default: up to 11 with weights that fade, if the motion allows.
     """
 
     def __init__(
