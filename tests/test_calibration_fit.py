@@ -8,6 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
+from towline.base.text import counted
 from towline.estimation.calibration import Measurements, calibrate, cross_validation, representative, starts
 from towline.estimation.calibration import model as model_module
 from towline.estimation.calibration.autocorrelation import information_of
@@ -252,6 +253,8 @@ def test_of_an_oversampled_log_some_samples_are_used(monkeypatch):
     assert 0 <= slip.sample - 4_000 < 3 * samples[1]
     assert slip.size == pytest.approx(-0.04, abs=2e-3)
     assert f"cables[5].slip at sample {slip.sample}" in [one.name for one in found.parameters]
+    earlier = f"(or up to {counted(samples[1] - 1, 'sample')} earlier, which were not used)"
+    assert f"from sample {slip.sample} on {earlier} it is" in found.report()
     assert (2, samples[100]) in {(one.cable, one.sample) for one in found.outliers}
     assert found.clock == pytest.approx(0.017, abs=1e-3)
     names = [one.name for one in found.parameters]

@@ -1,6 +1,7 @@
 """An initial value of the clock offset: repeating motions cause local minima, so many values are tried."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -8,7 +9,7 @@ from ...models.robot import Robot
 from ..logs.alignment import coarse
 from ..logs.measurements import Measurements, measured_poses, tracked
 from ..logs.pose_track import PoseTrack
-from ..logs.smoothing import PAUSE
+from ..logs.smoothing import after_pauses
 from .fit import held
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
@@ -58,9 +59,8 @@ def winds(measurements: Measurements) -> bool:
     Cables that are locked again after each pause do not: a wrong offset only moves poses from one part to the next.
     """
     assert measurements.times is not None
-    apart = np.diff(measurements.times)
-    pauses = np.flatnonzero(apart > PAUSE * np.median(apart)) + 1
-    return not all(is_still(measurements.only(rows)) for rows in np.split(np.arange(len(measurements)), pauses))
+    ends = [0, *after_pauses(measurements.times), len(measurements)]
+    return not all(is_still(measurements.only(slice(*part))) for part in pairwise(ends))
 
 
 def moves_smoothly(robot: Robot, measurements: Measurements) -> bool:

@@ -20,6 +20,7 @@ from .parameters import Parameters
 FEWEST_MOVING = 50  # samples without times; fewer are always taken to be at rest
 SMALL, SMOOTH = 0.05, 0.7  # steps of a motion over its extent, and their changes over the steps
 OF_QUARTICS = 9  # neighbours of which quartics average noise
+MOST_OF_QUARTICS = 250  # neighbours to each side: with 25 at 1 kHz, noise of the accelerations hides the mass
 SLOWEST = 0.2  # [s] between samples of a motion; if they are farther apart, the platform is taken to be at rest
 
 
@@ -98,7 +99,9 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
             carriers = measurements.carrier_poses[..., :3]
             bends += [np.linalg.norm(local.fitted(one).bends, axis=1) for one in np.swapaxes(carriers, 0, 1)]
         return rest._replace(sigma=np.max(bends, axis=0), is_known=False)
-    local = Polynomials(times, of_poses, 4 if OF_QUARTICS <= of_poses <= count / 4 else 2)
+    of_quartics = max(of_poses, within(times, most=MOST_OF_QUARTICS))
+    wide = OF_QUARTICS <= of_quartics <= count / 4
+    local = Polynomials(times, of_quartics, 4) if wide else Polynomials(times, of_poses)
     moved, inverse = local.fitted(np.hstack([position, quaternions])), quaternions * [-1, -1, -1, 1]
     rate, spin = (2 * _vector_of_product(part[:, 3:], inverse) for part in (moved.slopes, moved.bends))
     sigma = moved.noise[2, :, :3].max(axis=1)

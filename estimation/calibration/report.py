@@ -207,12 +207,12 @@ def _one(one: Parameter) -> tuple[str, str, str, str]:
 
 
 def _of_exceptions(result: CalibrationData) -> list[str]:
-    lines = [
-        f"cables[{slip.cable}] slipped on its winch: from sample {slip.sample} on it is {_mm(abs(slip.size))} "
-        f"{'longer' if slip.size > 0 else 'shorter'} than its reading (+- {_mm(slip.sigma)})"
-        for slip in result.slips
-    ]
     model = result._solved.model
+    lines = [
+        f"cables[{slip.cable}] slipped on its winch: {result._since(first)} it is {_mm(abs(slip.size))} "
+        f"{'longer' if slip.size > 0 else 'shorter'} than its reading (+- {_mm(slip.sigma)})"
+        for slip, (_, first) in zip(result.slips, model.parameters.slips, strict=True)
+    ]
     felt = model.felt if hangs(model.robot, model.measurements) else None
     slack_there = (slack(model, result._solved.fit.state) & ~model.weights).T
     for why, which in left_out(model.robot, model.measurements, felt.tensions if felt else None).items():

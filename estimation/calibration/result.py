@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ...base.display import BLUE, GREY, Displayed, picture
 from ...base.errors import InputError
 from ...base.inputs import real_array
-from ...base.text import quantity
+from ...base.text import counted, quantity
 from ...models import points
 from ...models.part import LARGEST
 from ...models.robot import Robot
@@ -111,7 +111,7 @@ class CalibrationData(Displayed):
             share = f"{100 * len(self.outliers) / self.residuals.size:.0f} %"
             return f"{share} of the readings do not fit the others, so check clocks, frames and sensors"
         if loads := load_changes(self._solved.model, self._solved.fit.state) if "mass" in self.free else []:
-            texts = [f"{quantity(mass, 'kg', digits=3)} from sample {self._in_log(begin)} on" for begin, mass in loads]
+            texts = [f"{quantity(mass, 'kg', digits=3)} {self._since(begin)}" for begin, mass in loads]
             return f"the mass changes during the log: {', '.join(texts)}; calibrate each part alone"
         held_out = self.held_out
         if np.isfinite(held_out.after) and held_out.after > max(held_out.before, EXACT * self.stated_sigma):
@@ -304,6 +304,12 @@ class CalibrationData(Displayed):
         slips = self._numbered.slips
         own = self.parameters[len(self.parameters) - len(slips) :]
         return tuple(Slip(*place, one.value, one.sigma) for place, one in zip(slips, own, strict=True))
+
+    def _since(self, used: int) -> str:
+        """Return since which sample of the log something holds, of which a used one is the first that shows it."""
+        skipped = self._in_log(used) - self._in_log(used - 1) - 1 if used else 0
+        earlier = f" (or up to {counted(skipped, 'sample')} earlier, which were not used)" if skipped else ""
+        return f"from sample {self._in_log(used)} on{earlier}"
 
     def _in_log(self, sample: int) -> int:
         return sample if self.samples is None else int(self.samples[sample])

@@ -33,6 +33,12 @@ def continuous(quaternions: np.ndarray) -> np.ndarray:
     return quaternions * np.cumprod(np.append(1.0, flips))[:, None]
 
 
+def after_pauses(times: np.ndarray) -> np.ndarray:
+    """Return the first sample after each pause of a log with times (N,) [s]."""
+    apart = np.diff(times)
+    return np.flatnonzero(apart > max(PAUSE * float(np.median(apart)), LONG)) + 1 if len(apart) else np.zeros(0, int)
+
+
 class _Part(NamedTuple):
     """Polynomials about n samples.
 
@@ -57,16 +63,16 @@ class Polynomials:
 
     def __init__(self, times: np.ndarray, width: int, degree: int = 2, fading: bool = False):
         self._times, self._width, self._degree, self._fading, count = times, width, degree, fading, len(times)
-        pauses = np.flatnonzero(np.diff(times) > max(PAUSE * float(np.median(np.diff(times))), LONG)) + 1
-        ends = np.concatenate([[0], pauses, [count]])
+        ends = np.concatenate([[0], after_pauses(times), [count]])
         sizes = np.diff(ends)
         self._first = np.repeat(np.where(sizes < width, 0, ends[:-1]), sizes)  # neighbour that each sample may have
         self._last = np.repeat(np.where(sizes < width, count, ends[1:]), sizes)
-        self._only = self._part(0) if len(times) <= PART else None
+        self._at_once = PART * (2 * MOST + 1) // max(width, 2 * MOST + 1)
+        self._only = self._part(0) if count <= self._at_once else None
 
     def _part(self, begin: int) -> _Part:
         count, width = len(self._times), self._width
-        at = np.arange(begin, min(begin + PART, count))
+        at = np.arange(begin, min(begin + self._at_once, count))
         rows = np.clip(at - width // 2, self._first[at], self._last[at] - width)[:, None] + np.arange(width)
         apart = self._times[rows] - self._times[at, None]
         unit = np.abs(apart).max(axis=1, keepdims=True)
@@ -81,7 +87,7 @@ class Polynomials:
         if self._only is not None:
             yield self._only
         else:
-            yield from map(self._part, range(0, len(self._times), PART))
+            yield from map(self._part, range(0, len(self._times), self._at_once))
 
     @cached_property
     def share(self) -> np.ndarray:
@@ -107,9 +113,9 @@ class Polynomials:
         return Fitted(result[0], result[1], result[2], spread[..., None] * noise)
 
 
-def within(times: np.ndarray, span: float = SPAN) -> int:
-    """Return the number of neighbours of a parabola that extends over `span` [s] to each side."""
-    return 2 * int(np.clip(span / np.median(np.diff(times)), FEWEST, min(MOST, (len(times) - 1) // 2))) + 1
+def within(times: np.ndarray, span: float = SPAN, most: int = MOST) -> int:
+    """Return the number of neighbours of a polynomial over `span` [s], and at most `most` samples, to each side."""
+    return 2 * int(np.clip(span / np.median(np.diff(times)), FEWEST, min(most, (len(times) - 1) // 2))) + 1
 
 
 def smooth(times: np.ndarray, values: np.ndarray, neighbours: int = NEIGHBOURS) -> np.ndarray:
