@@ -266,6 +266,22 @@ def test_of_an_oversampled_log_some_samples_are_used(monkeypatch):
     assert representative.representative(robot, shaken) is None
 
 
+def test_a_slip_in_a_pause_is_seen_from_the_first_sample_after_it():
+    """The last sample before it shows nothing: due to the clock offset, its pose is inside the pause."""
+    draw, robot = np.random.default_rng(3), load("cogiro")
+    times = 0.05 * np.arange(400) + 20 * (np.arange(400) >= 200)
+
+    def poses(at):
+        return robot.home + [3, 2, 0.8, 0.1, 0.1, 0.3] * np.sin(np.outer(at, [1.1, 0.7, 0.9, 0.6, 0.8, 0.5]))
+
+    lengths = Dynamics(robot).cable_lengths(poses(times + 0.02)) + draw.normal(0, 1e-3, (400, robot.m))
+    lengths[200:, 5] += 0.04
+    measured = poses(times) + draw.normal(0, 5e-4, (400, 6))
+    log = Measurements(lengths, measured, times=times, sigma={"lengths": 1e-3, "position": 5e-4, "rotation": 5e-4})
+    (slip,) = calibrate(robot, log).slips
+    assert (slip.cable, slip.sample) == (5, 200)
+
+
 def test_long_rests_hide_neither_a_motion_nor_how_fast_it_is():
     """Of 2000 s, the robot moves for 20 s in one part: slowly, or too fast for every second sample."""
     draw, robot, times = np.random.default_rng(4), load("planar-4"), 0.01 * np.arange(200_000)

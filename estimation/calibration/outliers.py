@@ -294,6 +294,7 @@ def find_slips(model: Model, state: State, length: float) -> list[Slip]:
         statistic[:SHORTEST] = statistic[-SHORTEST + 1 :] = 0.0
         statistic[information < SMALLEST_REDUNDANCY * SHORTEST] = 0.0
         k = int(np.argmax(statistic))
+        k += int(np.argmax(found.redundancy[i, k:] > SMALLEST_REDUNDANCY))  # the first sample that shows it
         candidates.append((float(statistic[k]), i, k, float(sums[k] / information[k]), float(information[k] ** -0.5)))
     unit = model.measurements.sigma.lengths
     # A wrong reading disturbs a cable's parameters, and so all its residuals: the clearest may be no step.
