@@ -264,6 +264,12 @@ def test_of_an_oversampled_log_some_samples_are_used(monkeypatch):
     assert f"from {len(samples)} samples of a longer log" in found.report()
     shaken = log.changed(poses=measured + 0.01 * np.sin(0.25 * np.arange(count))[:, None])
     assert representative.representative(robot, shaken) is None
+    lost = np.arange(count) % 97 == 5  # as of a camera, while cables are of constant length
+    gaps = shaken.changed(poses=np.where(lost[:, None], np.nan, shaken.poses), lengths=np.full_like(lengths, 5.0))
+    assert representative.representative(robot, gaps) is None
+    swings = 0.1 * np.sin(times) * (times > 33) * (times < 43)
+    rests = gaps.changed(poses=np.where(lost, np.nan, swings)[:, None] * np.ones(6))
+    assert {3_500, 4_100} <= set(representative._blocks(rests))
 
 
 def test_a_slip_in_a_pause_is_seen_from_the_first_sample_after_it():

@@ -3,6 +3,8 @@
 The others would only reduce the effect of noise, which is small beside errors of the model in so many samples.
 """
 
+from warnings import catch_warnings
+
 import numpy as np
 
 from ...models.robot import Robot
@@ -15,6 +17,7 @@ MANY = 100_000  # samples of a log, of which all are used
 LEAST = 0.5  # of the stated standard deviations: a smaller noise does not matter
 BLOCKS, BLOCK = 20, 1000  # of successive samples where forces count, which take far longer
 CHANCE = 4.0  # standard deviations of a ratio of roughnesses, at most 1 / sqrt(n) each
+MEASURED = 0.5  # of the samples: values that are missing more often do not show the motion
 THIN = 10  # samples apart, those that show what a block is like
 
 
@@ -40,8 +43,10 @@ def _blocks(log: Measurements) -> np.ndarray:
     """
     whole, given = len(log) // BLOCK, [one for one in (log.lengths, log.poses, log.tensions) if one is not None]
     values = np.dstack([one[: whole * BLOCK].reshape(whole, BLOCK, -1)[:, ::THIN] for one in given])
-    shown = np.hstack(list(np.quantile(values, (0.1, 0.5, 0.9), axis=1)))  # wrong readings are few
-    shown = np.nan_to_num((shown - shown[0]) / np.maximum(np.ptp(shown, axis=0), 1e-12))
+    with catch_warnings(action="ignore", category=RuntimeWarning):  # blocks without a value of a column
+        shown = np.hstack(list(np.nanquantile(values, (0.1, 0.5, 0.9), axis=1)))  # wrong readings are few
+        low, high = np.nanmin(shown, axis=0), np.nanmax(shown, axis=0)
+    shown = np.nan_to_num((shown - low) / np.maximum(high - low, 1e-12))
     chosen = np.linspace(0, whole - 1, BLOCKS // 2).astype(int)
     while len(chosen) < BLOCKS:
         apart = np.linalg.norm(shown[:, None] - shown[chosen], axis=2).min(axis=1)  # (whole,)
@@ -64,13 +69,16 @@ def _spacing(robot: Robot, measurements: Measurements) -> int:
     values = some.lengths, some.poses, some.tensions, some.carrier_poses
     pairs = [(one.reshape(len(some), -1), size) for one, size in zip(values, sizes, strict=True) if one is not None]
     each, stated = map(np.hstack, zip(*pairs, strict=True))
-    known = np.isfinite(each).all(axis=0)
-    each = each[:, known]
-    usual = np.maximum(roughness(some.times, each, moving=True), LEAST * stated[known])
+    known = np.isfinite(each).mean(axis=0) > MEASURED
+    rows = np.isfinite(each[:, known]).all(axis=1)
+    if rows.mean() < MEASURED:
+        return 1
+    each, times = each[rows][:, known], some.times[rows]
+    usual = np.maximum(roughness(times, each, moving=True), LEAST * stated[known])
     wanted = min(-(-len(measurements) // MANY), int(SLOWEST / np.median(np.diff(some.times))))
     for n in range(wanted, 1, -1):
         fewer = slice(None, None, 2 * n)
         most = ROUGHER + CHANCE / np.sqrt(len(each[fewer]))
-        if (roughness(some.times[fewer], each[fewer], moving=True) <= most * usual).all():
+        if (roughness(times[fewer], each[fewer], moving=True) <= most * usual).all():
             return n
     return 1
