@@ -35,7 +35,7 @@ def came_too_near(audited: Instants) -> list[Excess]:
     chosen = [limit for limit in audited.scenario.limits if isinstance(limit, Distance)]
     moved = _moved(audited) if chosen else np.zeros(0)
     for limit in chosen:
-        values = _values(audited, limit, limit.per_metre * moved)
+        values = _values(audited, limit, moved)
         holds = audited.scenario.in_force(limit, audited.times)
         slack = np.where(np.isnan(values), -np.inf, values - limit.low + limit.tolerance)
         slack[~holds] = np.inf
@@ -56,15 +56,16 @@ def came_too_near(audited: Instants) -> list[Excess]:
     return list(exceeded.values())
 
 
-def _values(audited: Instants, limit: Distance, changes: np.ndarray) -> np.ndarray:
+def _values(audited: Instants, limit: Distance, moved: np.ndarray) -> np.ndarray:
     """Return the distances of a limit at all instants, (n, k) [m].
 
-    They change by at most `changes` (n - 1,) from one to the next. Where this shows that they are larger than the limit
-    at all times between some instants, those in between are what they are at least.
+    No point moves by more than `moved` (n - 1,) [m] from one to the next. Where this shows that distances are larger
+    than the limit at all times between some instants, those in between are what they are at least.
     """
     scenario, n = audited.scenario, len(audited.times)
-    if not np.isfinite(changes).all():
+    if not (np.isfinite(limit.per_metre) and np.isfinite(moved).all()):
         return scenario.limits.distances(limit, audited.motion, audited.carriers)
+    changes = limit.per_metre * moved
     way, enough = np.insert(np.cumsum(changes), 0, 0.0), limit.low + changes.max(initial=0.0)
     values, known, more = np.empty((n, len(limit.labels))), np.zeros(n, bool), np.r_[0 : n - 1 : PARTS**3, n - 1]
     while more.size:
