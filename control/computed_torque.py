@@ -141,7 +141,7 @@ class ComputedTorque(Controller):
         self._usual_longest = self._slow_loops.longest
         loop, lag = number("tension_loop", tension_loop, 0.0, 1e3), number("tension_lag", tension_lag, 0.0, 1.0)
         left = WINCHES_KEEP
-        if self.robot.fixed_lengths is not None:  # tensions are late by what is left of the lag of the thrusts
+        if self.robot.fixed_lengths is not None:  # tensions lag as thrusts do in spite of their lead
             lag, left = min(rotors, ROTORS_KEEP), 0.0
         self._ahead = Lead(lag, left or ROTORS_KEEP, *self._limits) if lag > left else None
         self._loop = TensionLoop(loop, WINCHES_KEEP if self._ahead is None else 0.0, *self._limits) if loop else None

@@ -141,7 +141,7 @@ def minimum_in_box(
 def _solved(matrix: list[list[int]], right: list[int]) -> tuple[list[int], int]:
     """Solve a positive definite system by elimination on integers (Bareiss 1968); return x and what divides all of it.
 
-    What is left of the matrix stays symmetric, so only its upper triangle is kept.
+    After each step the remaining matrix is symmetric, so only its upper triangle is stored.
     """
     size, before = len(right), 1
     rows = [[*row[i:], value] for i, (row, value) in enumerate(zip(matrix, right, strict=True))]

@@ -25,7 +25,7 @@ from .winch_forces import has_winches, shares_of_winches
 STEP = 0.008  # [s] between two instants of a stop, in which u is linear
 FASTEST = 0.5 / STEP  # [1/s], of u
 WINDOW, INSTANTS = 0.8, 80  # [s] of the plan that limits are computed for at once, and at how many instants
-LEVELS = np.linspace(0.0, 1.0, 65)  # of r^2, at which is asked how slow a stop may become
+LEVELS = np.linspace(0.0, 1.0, 65)  # of r^2, for which the range of u shows how slow a stop may become
 ROOM = 1.0  # [1/s], between the least and the largest u
 STILL = 1e-9  # of the rate
 FLAT = 1e-12  # of the robot's forces: a facet along which u changes less does not bound it

@@ -33,7 +33,7 @@ class Motion(NamedTuple):
         rate, spin: Angular velocity [rad/s] and acceleration [rad/s^2] in {G}, (N, 3).
         turning: Rate of the angular momentum about the CoM in {G}, (N, 3) [N m].
         sigma: Standard deviation of the acceleration, 0 where the platform rests, (N,) [m/s^2].
-        smooth: Smoothing of values (N, d) by parabolas as wide, None without times.
+        smooth: Smoothing of values (N, d) by parabolas, None without times.
         is_known: Whether the poses show how the platform accelerates, or it is at rest, also by poses without times.
     """
 

@@ -96,7 +96,7 @@ def certainty(solved: Solved) -> float:
 def is_elastic(solved: Solved) -> bool:
     """Return whether a fit with elasticity shows that cables stretch, or that their stretch shows another CoM.
 
-    Of measured tensions it must explain the residuals, too: errors of load cells may look like a little stretch.
+    With measured tensions it must explain the residuals, too, because errors of load cells may look like stretch.
     """
     explained = solved.model.measurements.tensions is None or solved.noise.excess < UNEXPLAINED
     return solved.fit.converged and explained and certainty(solved) > CERTAIN

@@ -56,7 +56,7 @@ def balanced(scenario: Scenario, guess: Deviation) -> Deviation:
 def _about_home(scenario: Scenario, nodes: np.ndarray) -> Deviation:
     """Return the deviation that keeps carriers which may go anywhere about the platform as at home.
 
-    Those that are not fast enough follow a share of its motion, about the middle of its path.
+    Carriers that are too slow for this follow only a share of its motion, about the middle of its path.
     """
     robot, loose = scenario.robot, [] if scenario.relative else scenario.loose
     q, v, a = np.zeros((3, len(nodes), scenario.count))
