@@ -49,6 +49,10 @@ def blocked_tube(scenario: Scenario, ends: np.ndarray, reach: Callable[[int, np.
     for place, least in places:
         for point in points:
             path, both = (placed(its, point[None])[:, 0] for its in (poses, ends))
+            moves = np.append(True, np.diff(path, axis=0).any(axis=1))  # a dwell of an hour is one place
+            path = path[moves]
+            if len(path) < 3:
+                continue
             off = np.array([reach(end, point) for end in range(3)]) + CERTAIN
             off[2] += np.linalg.norm(np.diff(path, axis=0), axis=1).max()  # to the nearest instant, and as far again
             found = _crossing(place, path, both, off)
@@ -56,7 +60,7 @@ def blocked_tube(scenario: Scenario, ends: np.ndarray, reach: Callable[[int, np.
                 plane = f"plane with normal ({quantity_row(found.normal + 0.0)}) through the region's centre"
                 why = f"at least, wherever in the tube it crosses the {plane}"
                 about = f"{'platform' if body is None else PLATFORM} outside {place.name}"
-                time, value = float(times[found.row]), found.distance - inside
+                time, value = float(times[moves][found.row]), found.distance - inside
                 return [Excess(PlatformOutside.name, about, time, value, least, "m", "at least", why)]
     return []
 
