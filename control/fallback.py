@@ -12,20 +12,35 @@ CARRIED = 0.1  # the same of what fewer cables than degrees of freedom cannot gi
 
 
 def answer_others(robot: Robot, problems: InPlace, last: np.ndarray) -> np.ndarray:
-    """Return the status of each row, and let rows without tensions have those of the `last` command, (N, m) [N]."""
-    force = robot.force_scale
+    """Return the status of each row, and let rows without tensions have those of the `last` command, (N, m) [N].
+
+    The direction and the shortfall of a row become those of the wrench that its tensions miss, if these prove more.
+    """
+    force, scale = robot.force_scale, robot.wrench_scale
+    missing = scale * (problems.w - (problems.A @ problems.tensions[..., None])[..., 0])
+    size = np.sqrt(np.einsum("ij,ij->i", missing, missing))
     if robot.m < len(robot.platform.dof):
         # What is missing along a cable, tensions would give if limits let them; the rest is for the carriers.
-        scale = robot.wrench_scale
-        missing = scale * (problems.w - (problems.A @ problems.tensions[..., None])[..., 0])
         along = np.abs((scale * missing)[:, None] @ problems.A)[:, 0].max(axis=1)
-        square = np.einsum("ij,ij->i", missing, missing)
-        nearly = (along <= NEGLIGIBLE * force) & (square <= (CARRIED * force) ** 2)
+        nearly = (along <= NEGLIGIBLE * force) & (size <= CARRIED * force)
     else:
-        nearly = problems.shortfall <= NEGLIGIBLE * force  # false for nan
+        nearly = size <= NEGLIGIBLE * force  # false for nan
+    _prove_more(problems, scale * missing / np.where(size > 0, size, np.nan)[:, None])
     answered = np.where((problems.code == OPTIMAL) | nearly, PLANNED, SOFT).astype(np.int8)
     lost = ~np.isfinite(problems.tensions).all(axis=1)
     answered[lost] = HOLD
     target = np.where(np.isfinite(problems.t_ref), problems.t_ref, last)
     problems.tensions[lost] = np.clip(target, *problems.bounds)[lost]
     return answered
+
+
+def _prove_more(problems: InPlace, directions: np.ndarray) -> None:
+    """Take other directions, (N, 6), where w exceeds what the limits permit along them by more.
+
+    The core proves that no tensions give w by the first direction that it finds, along which little can be missing.
+    """
+    gains = (directions[:, None] @ problems.A)[:, 0]  # (N, m)
+    support = np.maximum(*(gains * bound for bound in problems.bounds)).sum(axis=1)
+    shortfall = np.einsum("ij,ij->i", directions, problems.w) - support
+    more = shortfall > problems.shortfall  # false for nan, where nothing is proven
+    problems.direction[more], problems.shortfall[more] = directions[more], shortfall[more]

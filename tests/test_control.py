@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
 from towline.base.errors import InputError
@@ -189,6 +190,29 @@ def test_every_state_is_answered_inside_limits_and_rates(name):
         gap = np.einsum("nj,nj->n", command.direction[proven], controller._problems.w[proven]) - most
         assert (gap > 0).all(), "a direction along which every tension inside the bounds misses the wrench"
     assert {"soft wrench", "hold"} <= answers
+
+
+@pytest.mark.parametrize("name", ["cogiro", "ipanema-1", "planar-4"])
+def test_a_step_is_as_planned_if_its_tensions_give_the_wrench_and_says_how_much_they_miss(name):
+    """Above the anchors and far off, where much is missing, by bounded least squares of SciPy.
+
+    The first direction that proves it may be one along which nearly nothing is missing, even of half the weight.
+    """
+    robot, rng, rows = load(name), np.random.default_rng(3), 60
+    state, reference = at_home(robot, rows)
+    heights = np.append(rng.uniform(0, 1.6, rows - 1), 1e4) * (robot.anchors[:, 2].max() - robot.home[2])
+    turns = np.pad(rng.uniform(-0.1, 0.1, (rows, 3)), ((0, 0), (3, 0)))
+    pose = state.pose + robot.dof_mask * (turns + heights[:, None] * np.eye(6)[2])
+    controller = ComputedTorque(robot)
+    command = controller.step(0.0, state._replace(pose=pose), reference._replace(pose=pose))
+    scale, problems, wanted = robot.wrench_scale, controller._problems, command.answered == ANSWERS.index("as planned")
+    for row in range(rows):
+        A, w = scale[:, None] * problems.A[row], scale * problems.w[row]
+        missing = np.sqrt(2 * lsq_linear(A, w, (robot.t_min, robot.t_max), method="bvls", tol=1e-14).cost)
+        assert wanted[row] == (missing <= 1e-3 * robot.weight), missing
+        if not wanted[row]:
+            assert command.shortfall[row] == pytest.approx(missing, rel=1e-3)
+    assert 5 < wanted.sum() < rows - 5
 
 
 def test_a_row_of_a_batch_is_answered_as_it_is_alone():

@@ -34,10 +34,7 @@ static int is_given(const towline_unit *unit, const towline_problem *problem, co
         missing[k] /= k < 3 ? 1 : unit->length;
         square += missing[k] * missing[k];
     }
-    if (m >= freedom) {
-        const int proven = answer->status == TOWLINE_INFEASIBLE || answer->status == TOWLINE_SINGULAR;
-        return proven && answer->shortfall <= unit->negligible;
-    }
+    if (m >= freedom) { return square <= unit->negligible * unit->negligible; }
     for (int i = 0; i < m; i++) {
         double along = 0;
         for (int k = 0; k < 6; k++) { along += missing[k] / (k < 3 ? 1 : unit->length) * problem->A[k * m + i]; }
