@@ -177,7 +177,7 @@ def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> N
         rows.append((name, f"{values[i]} {unit}", spread if robot.dof_mask[i] else "fixed"))
     print_table(["", "estimate", "sigma"], rows, "lrr")
     if robot.dof_mask[3:].any():
-        typer.echo("The sigmas of the angles are those of small rotations about the axes of {G}.")
+        typer.echo("The sigmas of the angles refer to small rotations about the axes of {G}.")
     typer.echo(_included(estimate))
     if estimate.by_gravity and estimate.converged:
         typer.echo("The lengths do not determine the pose. This is the equilibrium pose.")

@@ -57,12 +57,12 @@ class ComputedTorque(Controller):
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
         bandwidth: Bandwidth b of the error's decay [rad/s], a number or one for each coordinate of the pose: Kp = b^2.
             Default: 10, but 1.5 with fewer cables than degrees of freedom, because the load swings with its carriers;
-            see `sensors`. If the first two steps, or three in a row, are more than 0.6 / b apart, the default is
-            lowered, and that of `observer` with it, because the loop is unstable from 1 / b on. Both are restored after
-            two steps that are closer together.
-            A given bandwidth is kept, with a warning. If carriers fly, all bandwidths are lowered by the same factor,
-            because their attitude loops need steps of at most 0.75 / `attitude`, less 1.5 times the mean age of states
-            with a `time`. Other carriers that correct errors need steps of at most 0.75 / `carrier_bandwidth`.
+            see `sensors`. If the first two steps, or three in a row, are more than 0.6 / b apart, the defaults of
+            `bandwidth` and `observer` are lowered, because the loop is unstable from 1 / b on. Both are restored after
+            two steps that are closer together. A given bandwidth is kept, with a warning. If carriers fly, all
+            bandwidths are lowered by the same factor, because their attitude loops need steps of at most 0.75 /
+            `attitude`, less 1.5 times the mean age of states with a `time`. Other carriers that correct errors need
+            steps of at most 0.75 / `carrier_bandwidth`.
         damping: Damping ratio z: Kd = 2 z b.
         integral: Ki [1/s^3], a number or one for each coordinate. It pauses while the status is not "as planned".
         observer: Bandwidth of the estimates of the disturbance and of forces on flying carriers [rad/s]; 0: no

@@ -28,7 +28,7 @@ class Controller(ABC):
         """Return the command from now until the next step.
 
         Args:
-            time: Time of the step [s], later than that of the last one.
+            time: Time of the step [s], later than the time of the last one.
             state, reference: Measured state, and desired motion at this time.
 
         Raises:

@@ -49,7 +49,7 @@ class Filtered(Controller):
             object with the methods of `Filter`, which receives the reference instead of the computed acceleration.
 
     Raises:
-        InputError: If an argument has a wrong type, or the filter is that of another robot.
+        InputError: If an argument has a wrong type, or the filter belongs to another robot.
     """
 
     def __init__(self, controller: Controller, filter: Filter):

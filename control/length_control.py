@@ -35,7 +35,7 @@ MEMORY = 1.0  # [s], of references, and of the largest age of poses, on which ga
 
 
 class LengthControl(Controller):
-    r"""Command unstrained lengths: those of the plan, ahead of the winches, and a correction by the measured pose.
+    r"""Command the unstrained lengths of the plan, ahead of the winches, with a correction by the measured pose.
 
         L0 = l(x) / (1 + s) + J (P e + I * integral of e)
 

@@ -37,7 +37,7 @@ class Noise(Part):
 
     @property
     def of_pose(self) -> np.ndarray:
-        """Return the standard deviations of positions [m] and angles [rad], those of resolutions included, (2,)."""
+        """Return the standard deviations of positions [m] and angles [rad], including resolutions, (2,)."""
         steps = np.array([self.resolution, self.attitude_resolution]) / np.sqrt(12)
         return np.hypot(np.array([self.position, self.attitude]), steps)
 

@@ -31,7 +31,7 @@ def references(
 ) -> list[Reference]:
     """Return the reference of each period of a plan, as `Predictive.follow` and a control loop take them.
 
-    Reference k is that of the plan at the time start + k period. The last one is the first at or after the plan's end.
+    Reference k is the plan at the time start + k period. The last one is the first at or after the plan's end.
 
     Args:
         plan: A `Plan`, a `Stop`, another object with a `trajectory`, such a dataset, or the NetCDF file of one.

@@ -45,8 +45,8 @@ class Predictive(ComputedTorque):
 
         min  sum of |x - x_ref|^2 + |u - u_ref|^2 over the stages     s.t.  the robot's dynamics,  t_min <= t <= t_max
 
-    The controls are the tensions, and the accelerations of the carriers that may leave their reference. Only they have
-    hard limits, which are bounds, so the problem is always feasible. Each step linearises the dynamics about the last
+    The controls are the tensions, and the accelerations of the carriers that may leave their reference. Only the
+    controls have hard limits, so the problem is always feasible. Each step linearises the dynamics about the last
     solution, shifted in time, and solves one quadratic program (`solvers.horizon`): a real-time iteration. Disturbances
     are estimated as by `ComputedTorque` and predicted to be constant.
 

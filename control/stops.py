@@ -22,20 +22,20 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
     """Stop on the path of a plan as soon as tensions inside their limits permit.
 
     Platform and carriers stay on their path, each at the same fraction of the plan's velocity at any time, and never
-    become faster than planned. Accelerations and tensions are continuous. Where no stop inside the limits was found,
-    the result is the stop with the smallest missing wrench, with its certificate. The time to compute it depends on
-    how long the robot takes to stop, not on the plan.
+    become faster than planned. Accelerations and tensions are continuous. If no stop inside the limits was found, the
+    result is the stop with the smallest missing wrench, with its certificate. The time to compute it depends on how
+    long the robot takes to stop, not on the plan.
 
     Carriers that fly, each with one cable, leave their path: each moves so that its cable has the direction of the
     required force, which changes as little as possible (`statics.team_stops`). If all cables together give every
-    wrench, flying carriers stay on their paths and tilt. Those with cables of fixed length, which must begin at one
-    point of a carrier, keep the path of that point. Winches make up for tilts with the lengths of their cables.
+    wrench, flying carriers stay on their paths and tilt. Cables of fixed length must then begin at one point of each
+    carrier, and this point stays on its path. Winches compensate tilts by the lengths of their cables.
 
     Args:
         plan: A `Plan`, another object with such a `trajectory`, such a dataset, or the NetCDF file of one.
-        time: Time in the plan at which the stop begins [s]; a time after the plan's end means the end. A plan that
-            ends while the robot moves is continued with its last velocity. Its last acceleration and rotation fade
-            within a second, and so does the motion of a team's carriers relative to the platform.
+        time: Time in the plan at which the stop begins [s]; a time after the plan's end means the end. A plan that ends
+            while the robot moves is continued with its last velocity. Its last acceleration and rotation, and the
+            motion of a team's carriers relative to the platform, fade within a second.
 
     Returns:
         Stop: `simulate` and `references` take it as they take a plan.

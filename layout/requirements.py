@@ -119,7 +119,7 @@ class Requirement(Part):
         return self
 
     def places(self, grid: tuple[int, ...] | None = None) -> np.ndarray:
-        """Return the poses, (N, 6) [m, rad]: those of the list, or those of a grid in the box (default: its own)."""
+        """Return the poses, (N, 6) [m, rad]: the list, or a grid in the box (default: its own)."""
         if self.box is None:
             return np.array(self.poses)
         axes = [

@@ -36,12 +36,11 @@ MOST_LISTED = 8
 class Design(Drawn, Reported, Displayed):
     """The result of `design`.
 
-    - `robot`: the best robot found; that of the file if the requirements are impossible. `before`: the initial robot.
-    - `requirements`: those of the design.
-    - `status`: feasible if `robot` has the required margin (by `capacity_margin`, at the worst poses of the grid and of
-      an audit), distances and lengths of cables, lowest natural frequency and plans of tasks; infeasible if
-      `impossibility` proves that no layout inside the boxes meets the requirements; otherwise not-found, which proves
-      nothing.
+    - `robot`: the best robot found; the initial one, `before`, if the requirements are impossible.
+    - `requirements`: the requirements of the design.
+    - `status`: feasible if `robot` meets the requirements at the poses of the grid and of an audit, and tasks have
+      plans; infeasible if `impossibility` proves that no layout inside the boxes meets the requirements; otherwise
+      not-found, which proves nothing.
     - `margin`, `margin_before`: smallest capacity margin of both robots at the same poses, with moments divided by
       `before.length` [N].
     - `clearance`: smallest distance between two cables [m]; infinite for one cable.

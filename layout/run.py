@@ -41,8 +41,8 @@ def design(
     """Find anchors, attachments and tension limits with the largest capacity margin at the worst pose.
 
     Simulated annealing on a few poses proposes layouts, sequential linear programs on all poses improve them, and
-    audits at 100 000 random poses add the worst of these. The result is judged by `capacity_margin`. It is a local
-    optimum. Carriers are at home.
+    audits at 100 000 random poses add the worst ones to the poses. The result is at best a local optimum. Carriers are
+    at home.
 
     - `robot`: a `Robot`, the name of one in the library, or the path of a robot file.
     - `free`: numbers to choose: `Free`, or mappings with its keys.

@@ -93,7 +93,7 @@ class Carrier(Part):
         for kind in get_args(cls.model_fields["kind"].annotation):
             known = _KINDS.get(kind, cls)
             if (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
-                raise InputError(f"kind must differ from that of {known.__name__}, got {kind!r} for {cls.__name__}")
+                raise InputError(f"kind must differ from the kind of {known.__name__}, got {kind!r} for {cls.__name__}")
             _KINDS[kind] = cls
             json_schema.cache_clear()
 

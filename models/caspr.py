@@ -296,10 +296,10 @@ def _cable(node: _Node, com: np.ndarray, notes: Counter[str]) -> Cable:
     properties = node.child("properties")
     lower = properties.find("force_min")
     if lower is None:
-        notes["force_min is missing, taken as 0 N"] += 1
+        notes["force_min is missing, replaced by 0 N"] += 1
     upper = properties.number("force_max")
     if upper > LARGEST:
-        notes[f"force_max {upper:g} N, which stands for no limit, is taken as {LARGEST:g} N"] += 1
+        notes[f"force_max {upper:g} N, which stands for no limit, is replaced by {LARGEST:g} N"] += 1
     data: dict[str, Any] = {
         "carrier": "frame",
         "t_min": 0.0 if lower is None else lower.numbers(1)[0],

@@ -34,7 +34,7 @@ class RelativeDynamics(Displayed):
 
     docs/theory.md names the paper.
 
-    `pose`, `velocity` and `acceleration` are those of the platform frame relative to {A}, in the axes of {A};
+    `pose`, `velocity` and `acceleration` describe the platform frame relative to {A}, in the axes of {A};
     `carrier_pose`, `carrier_velocity` and `carrier_acceleration` are those of {A} in {G}, default: at home and at rest.
     Each is (..., 6) [m, rad], since the only carrier needs no dimension of its own.
 

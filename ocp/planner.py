@@ -61,7 +61,7 @@ def plan(
             its keys) in the frame of the task's path. Default: the planner's guess.
         initial: The measured state from which the motion starts, instead of the task's `initial`: an `Initial`, a
             mapping with its keys, or a `control.State`.
-        robust: Fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, instead of the task's:
+        robust: Fraction of all robots within the `uncertainty` of the robot file, such as 0.95, instead of the task's:
             to first order, this fraction has tensions inside their limits at all times of the plan. The planner
             iterates, with limits tightened by the tension spread of the previous plan.
 

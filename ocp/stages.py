@@ -43,7 +43,7 @@ from .tasks.status import MotionStatus
 from .tasks.wind_set import WindDisc
 
 NO_SLACK = 1e-3  # of the weight: a motion with less missing at its nodes is a start for another try
-UNPROVEN = "in winds that enclose those of the disc no tensions exist, but no wind of the disc rules the motion out"
+UNPROVEN = "no tensions exist in winds a little stronger than the task's; for the task's own winds this is not proven"
 
 
 def climb(search: Search, start: Deviation | None, last: tuple[Mesh, Deviation] | None) -> Plan:

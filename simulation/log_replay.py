@@ -122,7 +122,7 @@ class Replay(Drawn, Reported, Displayed):
 
     @property
     def robot(self) -> Robot:
-        """Return the robot with the fitted parameters; without a fit, that of the file."""
+        """Return the robot with the fitted parameters; without a fit, the robot of the file."""
         file, fitted = self.windows.recorded.robot, self.fitted
         if fitted is None:
             return file
@@ -376,11 +376,11 @@ def _value(name: str, value: Any) -> str:
         gains, zeros = np.reshape(value, (2, -1))
         worst = int(np.argmax(np.abs(gains) + np.abs(zeros)))
         rest = f"{'plus' if zeros[worst] >= 0 else 'minus'} {100 * abs(zeros[worst]):.2g} % of the median tension"
-        return f"that of cables[{worst}] reads {1 + gains[worst]:.3g} times the tension {rest}"
+        return f"the cell of cables[{worst}] reads {1 + gains[worst]:.3g} times the tension {rest}"
     if name == "thrusts":
         each = np.atleast_1d(value)
         worst = int(np.argmax(np.abs(each)))
-        return f"that of carriers[{worst}] is recorded as {1 + each[worst]:.3g} times the thrust"
+        return f"the thrust of carriers[{worst}] is recorded as {1 + each[worst]:.3g} times the thrust"
     if name in FACTORS:
         return f"{value:.4g} times the file's"
     return quantity(1e3 * value, "ms", 3) if name == "delay" else quantity(value, "N", 3)

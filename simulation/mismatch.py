@@ -42,7 +42,7 @@ class Mismatch(Part):
 
     geometry: bool = optional("true: each run draws a robot from the file's `uncertainty`", False)
     mass: Factor = optional("factor of the platform's mass and inertia", 1.0)
-    com: Offset = optional("distance of the CoM from that of the file, along each axis [m]", 0.0)
+    com: Offset = optional("displacement of the CoM from its position in the file, along each axis [m]", 0.0)
     stiffness: Factor = optional("factor of the stiffness of cables", 1.0)
     tension_gain: Factor = optional("tension that a winch gives, divided by the command", 1.0)
     friction: Force = optional("dry friction of winches and pulleys, as a force on a cable [N]", 0.0)

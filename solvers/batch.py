@@ -121,10 +121,10 @@ def solve_batch(
     Leading dimensions broadcast as in NumPy. The ranks may differ inside a batch. An invalid row (NaN, t_min > t_max, a
     weight that is not positive) has the status "invalid", and the others are solved.
 
-    The C core solves several rows at a time in the lanes of vector registers, and rows with an uncertain result one by
-    one. `solve` solves rows that are still uncertain, near the boundary of the available wrench set or of the rank
-    tolerance. Statuses are equal to those of `solve`, and so are tensions up to rounding. The result of a row does not
-    depend on the other rows or on the number of threads, to the last bit.
+    The C core solves several rows at a time in the lanes of vector registers. Rows with an uncertain result, near the
+    boundary of the available wrench set or of the rank tolerance, are solved again by `solve`. Statuses are equal to
+    the statuses of `solve`, and tensions are equal up to rounding. The result of a row does not depend on the other
+    rows or on the number of threads, to the last bit.
 
     The core supports up to 6 wrench rows and 32 cables. `solve` solves all rows of larger problems, at about 0.2 ms
     each.
@@ -140,8 +140,8 @@ def solve_batch(
             to 1e12: every valid row gets tensions, and rows with a wrench error are "inaccurate". None = exact wrench.
         threads: Number of threads that share the rows; None = one for each 2000 rows, at most the number of processors.
             The result does not depend on it.
-        backend: "lanes" as described above, or "c" for rows one by one with the method of `solve`: for tests, and for
-            results equal to `solve` in every bit. None = "lanes".
+        backend: "lanes" as described above, or "c" for rows one by one, with results equal to `solve` in every bit.
+            None = "lanes".
 
     Raises:
         InputError: If an argument has a wrong type or shape.

@@ -37,7 +37,7 @@ def casadi_function(
 ) -> "casadi.Function":
     """Return the bounded quadratic program as a CasADi Function (A, w, t_min, t_max) -> t, with its derivative.
 
-    The tensions are those of method "soft-wrench" without rho: the optimum of "active-set" if w is available, otherwise
+    The method is "soft-wrench" without rho: the tensions are the optimum of "active-set" if w is available, otherwise
     the tensions of the closest available wrench, so that an iterate of a nonlinear program always gets numbers. They
     give w only if `A @ t` is `w`: make that a constraint if it matters. Derivatives with respect to all four inputs are
     exact; at kinks they are one-sided, see `sensitivity`. There are no second derivatives: give IPOPT

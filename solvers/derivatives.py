@@ -48,13 +48,12 @@ def sensitivity(problem: TensionProblem, solution: TensionSolution) -> Array:
 
     Returns:
         dt_i / dw_j, shape (m, n) [N per N, N per N m]. The tensions are piecewise linear in w. Where pieces meet (a
-            cable is at its limit but nothing holds it there) the result is one-sided: that of the piece on which such
+        cable is at its limit but nothing holds it there) the result is one-sided, for the piece on which such
             cables are free. It is 0 in directions of w that the free cables cannot give: there the active set changes
             at once (where pieces meet), or no tensions exist (on the boundary of the available wrench set).
 
     Raises:
-        InputError: If an argument has a wrong type, or the solution has no tensions or those of another number of
-            cables.
+        InputError: If an argument has a wrong type, or the solution has no tensions, or another number of cables.
     """
     tensions = required("solution", solution, TensionSolution).tensions
     if tensions is None:

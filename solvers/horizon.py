@@ -86,7 +86,7 @@ class Horizon(Displayed):
         tolerance, iterations_max: Largest residual of a converged solution, and largest number of iterations. Default:
             1e-8 and 50.
         converged, iterations: Success of the last solution, and the number of Newton matrices that it needed, without
-            that of a cold start.
+            the one of a cold start.
 
     Raises:
         InputError: If a size is not a whole number in its range.
@@ -136,9 +136,9 @@ class Horizon(Displayed):
     def relative_to(self, states: Array, controls: Array) -> None:
         """Write the same problem in differences from a reference.
 
-        Start, dynamics, bounds and soft rows change, and so do the states and controls with which a solve may begin.
-        The costs do not change, so write them for differences. Small differences are then not lost in the rounding of
-        large numbers.
+        Start, dynamics, bounds, soft rows, and the states and controls with which a solve may begin change. The costs
+        do not change, so write them for differences. Small differences are then not lost in the rounding of large
+        numbers.
 
         Args:
             states, controls: Of the reference, shapes (N + 1, n) and (N, m).

@@ -28,8 +28,8 @@ class Margin(NamedTuple):
 
     Attributes:
         value: The distance [N], moments divided by the problem's length: positive inside, negative outside.
-        gradient: d value / d w, shape (n,): force entries are numbers, moment entries in 1/m. Where two facets are
-            equally near it is that of one of them; the value has a kink there.
+        gradient: d value / d w, shape (n,): force entries are numbers, moment entries in 1/m. If two facets are equally
+            near, it is the gradient for one of them; the value has a kink there.
         direction: Outward direction d to the nearest boundary point (inside) or from it to w (outside), shape (n,), in
             the form of `Certificate.direction`. Then gradient = -direction. Zeros if there is no boundary.
     """

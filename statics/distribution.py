@@ -85,7 +85,7 @@ def pose_problem(
             continue
         array = real_array(name, value).astype(float, copy=False)
         if array.ndim > (2 if name.startswith("carrier") else 1):
-            raise InputError(f"{name} must be that of one instant, got an array of shape {array.shape}")
+            raise InputError(f"{name} must belong to one instant, got an array of shape {array.shape}")
         if np.isfinite(array).all() and np.abs(array).max(initial=0.0) > LARGEST:
             raise InputError(f"{name} must be numbers up to {LARGEST:g}, got {np.abs(array).max():g}")
     lengths, A = dynamics.cable_lengths(pose, carrier_pose), dynamics.wrench_matrix(pose, carrier_pose)

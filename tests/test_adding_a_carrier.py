@@ -146,7 +146,7 @@ def test_a_path_off_its_rail_is_refused(page):
 
 
 def test_a_kind_that_is_taken_is_refused():
-    with pytest.raises(InputError, match="kind must differ from that of GroundCarrier, got 'ground'"):
+    with pytest.raises(InputError, match="kind must differ from the kind of GroundCarrier, got 'ground'"):
 
         class Ground(Carrier):
             kind: Literal["ground"]

@@ -520,7 +520,7 @@ def test_a_calibrated_robot_is_a_robot_file(tmp_path):
         ({"free": ("anchor",)}, "free must be 'auto' or some of anchors, attachments, .*, got 'anchor'"),
         ({"free": ()}, r"free must be 'auto' or some of .*, got \(\)"),
         ({"free": ("radii",)}, "free must not have radii for robot cogiro, which has no pulleys"),
-        ({"prior": {"scales": 0.1}}, "prior must have keys among those of free, anchors, offsets, got 'scales'"),
+        ({"prior": {"scales": 0.1}}, "prior must only have keys that are in free, anchors, offsets, got 'scales'"),
         ({"prior": {"anchors": 0}}, "prior.anchors must be a number from 1e-09 to 1000, got 0"),
         ({"free": ("clock",)}, "measurements.times must be given to estimate a clock offset, got none"),
         ({"outliers": 1}, "outliers must be True or False, got 1"),

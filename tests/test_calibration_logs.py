@@ -262,7 +262,7 @@ def test_the_command_names_what_is_open(built, tmp_path):
         (("--prior", "anchors:1"), "--prior must be NAME=NUMBER, separated by commas"),
         (("--sigma", "small"), "--sigma must be a number [m]"),
         (("--out", "log.csv"), "--out must be a file other than the log"),
-        (("--free", "clock,offsets", "--prior", "anchors=1"), "prior must have keys among those of free"),
+        (("--free", "clock,offsets", "--prior", "anchors=1"), "prior must only have keys that are in free"),
     ],
 )
 def test_wrong_options(built, tmp_path, options, line):

@@ -212,8 +212,8 @@ def test_a_body_off_is_an_error_if_it_is_far_off(times, error):
     off[:, :3] = poses[:, :3] + times * (off[:, :3] - poses[:, :3])
     result = calibrate(robot, Measurements(y, off), outliers=False)
     assert bool(result.doubt) is error
-    assert ("DO NOT USE" if error else "CHECK THE LOG: the poses look like those of a body") in result.report()
-    assert result.to_dict()["doubt" if error else "hint"].count("the poses look like those of a body")
+    assert ("DO NOT USE" if error else "CHECK THE LOG: the poses seem to belong to a body") in result.report()
+    assert result.to_dict()["doubt" if error else "hint"].count("the poses seem to belong to a body")
 
 
 @pytest.mark.parametrize(

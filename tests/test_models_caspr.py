@@ -168,8 +168,8 @@ def test_what_is_left_out_is_noted(tmp_path):
         "my_cables.xml: text beside the elements of attachments is left out",
         "the joint's range, q_min to q_max, is left out",
         "the position of the tool, end_location, is left out",
-        "force_min is missing, taken as 0 N",
-        "force_max 1e+10 N, which stands for no limit, is taken as 1e+09 N",
+        "force_min is missing, replaced by 0 N",
+        "force_max 1e+10 N, which stands for no limit, is replaced by 1e+09 N",
         "the property diameter of cable_ideal is left out",
         "points on the ground before the last one are left out, they add a constant length",
     ]

@@ -110,7 +110,7 @@ def test_what_a_log_of_carriers_can_be_used_for(recording, tmp_path):
 def test_carriers_that_were_not_recorded_are_named(recording, tmp_path):
     few = {name: column for name, column in recording[1].items() if not name.startswith("quad3")}
     done = run("calibrate", NAME, write(tmp_path / "few.csv", few), "--free", "offsets", "--out", tmp_path / "few.yaml")
-    assert "the log has no poses of quad3: taken to be at home" in done.stdout
+    assert "the log has no poses of quad3: assumed to be at home" in done.stdout
 
 
 def test_poses_of_carriers_are_saved_and_checked(recording, tmp_path):

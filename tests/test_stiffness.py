@@ -148,7 +148,7 @@ def test_what_has_no_stiffest_tensions():
         (lambda: stiffest("ipanema-2", robot.home), r"cables\[0\].t_min must be above 0 N"),
         (lambda: stiffest(elastic("ipanema-2", None), robot.home), r"cables\[0\].stiffness must be E A > 0"),
         (lambda: stiffest(robot, [0, 0]), "pose must have the shape"),
-        (lambda: stiffest(robot, np.tile(robot.home, (2, 1))), "pose must be that of one instant"),
+        (lambda: stiffest(robot, np.tile(robot.home, (2, 1))), "pose must belong to one instant"),
         (lambda: stiffest(robot, robot.home, w=[1, 2]), "w must"),
         (lambda: stiffest(robot, robot.home, w=np.full(6, np.nan)), "w must"),
         (lambda: natural_frequencies(robot, robot.home, [1.0]), "tensions must have the shape"),

@@ -82,7 +82,7 @@ def test_locked_winches_and_poses_in_two_files(tmp_path):
     for free, kept in (("anchors", "offsets"), ("offsets", "anchors")):
         said = calibrate(robot, read, [free]).report()
         assert f"hold only if the file's {kept} are exact; with --free anchors,offsets --prior {kept}=0.02" in said
-    with pytest.raises(InputError, match="lengths must change to align the clocks, got those of locked winches"):
+    with pytest.raises(InputError, match="lengths must change to align the clocks, got readings of locked winches"):
         read_measurements(tmp_path / "winches.csv", poses=tmp_path / "camera1e+06.csv", robot=robot)
 
 
@@ -92,7 +92,7 @@ def test_rests_with_an_ahrs_and_load_cells(tmp_path):
     said = towline("pose", robot, "--log", "statics.csv", cwd=tmp_path).stdout
     assert "times as large as stated" in said  # because of the offsets
     values, told = found(towline("calibrate", robot, "statics.csv", "--free", "offsets", "--json", cwd=tmp_path))
-    assert any("taken to be good to 0.5 deg" in note for note in told["notes"])
+    assert any("treated as accurate to 0.5 deg" in note for note in told["notes"])
     for i in range(4):
         value, sigma = values[f"cables[{i}].offset"]
         assert abs(value - offsets[i]) < 4 * sigma

@@ -70,9 +70,9 @@ def sample(
         keep: Samples in the dataset: accepted, all or none.
         points_max: Maximum number of samples in the dataset; the first ones are kept.
         metrics: Names of metrics to compute at the samples in the dataset, any of `METRICS` (default: none).
-        robust: Fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, for which the conditions
-            about tension limits hold at all accepted configurations, to first order. It sets the key `robust` of these
-            conditions; others are not affected.
+        robust: Fraction of all robots within the `uncertainty` of the robot file, such as 0.95, for which the
+            conditions about tension limits hold at all accepted configurations, to first order. It sets the key
+            `robust` of these conditions; others are not affected.
         execution: Workers and checkpoint, see `Execution`. Its `progress` is called with (samples done, samples in
             total, samples accepted); the total is an upper bound for adaptive.
         options: Fields of `Execution` by their names, which replace its own.
@@ -85,8 +85,8 @@ def sample(
               `carrier_position` (point, carrier, axis) [m] if they vary; `accepted` (point) if all samples are kept.
             - `margin`, `natural_frequency`, `payload`, ... (point): the `metrics`, in their units; nan where they need
               tensions and there are none.
-            - `tried`, `reached` (x, y, z): samples in each of 32 x 32 x 32 cells of the box of positions, and those of
-              them that were accepted.
+            - `tried`, `reached` (x, y, z): samples in each of 32 x 32 x 32 cells of the box of positions, and accepted
+              samples.
             - `bounds` (end, axis) [m]: bounds of the accepted positions; nan if there are none.
             - `volume`, `volume_interval` (end) [m^3]: accepted fraction of the samples times the volume of the box,
               with the 95 % interval of Clopper and Pearson. It is the mean over all other varying quantities, and an

@@ -49,7 +49,7 @@ class Frames(NamedTuple):
         texts: list[str] = []
         for (shift, turn), what in (
             (self.outer, "the poses seem to be measured in a frame that is"),
-            (self.inner, "the poses look like those of a body whose frame is, seen from the platform frame,"),
+            (self.inner, "the poses seem to belong to a body whose frame is, seen from the platform frame,"),
         ):
             angle = float(np.linalg.norm(Rotation.from_matrix(turn).as_rotvec()))
             if angle > 1e-9 or shift.any():

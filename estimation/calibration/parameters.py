@@ -189,7 +189,7 @@ def check_prior(prior: Any, groups: tuple[str, ...]) -> dict[str, float]:
         raise InputError(f"prior must be a mapping of standard deviations, or None, got {shown(prior)}")
     for name in prior:
         if name not in groups:
-            raise InputError(f"prior must have keys among those of free, {', '.join(groups)}, got {shown(name)}")
+            raise InputError(f"prior must only have keys that are in free, {', '.join(groups)}, got {shown(name)}")
     return {name: number(f"prior.{name}", value, SMALLEST_PRIOR, LARGEST_PRIOR) for name, value in prior.items()}
 
 

@@ -130,12 +130,12 @@ def _of_noise(result: CalibrationData) -> list[str]:
     forces = result._solved.model.forces
     timeless = hangs(result.file, result.measurements) and result.measurements.times is None
     if timeless and forces is not None and not forces.motion_is_known:
-        lines.append("the poses look like those of a motion without times: stretch of the cables was not sought")
+        lines.append("the poses look like a motion without times, so stretch of the cables was not sought")
     for frame, end in ((one, ENDS[one]) for one in ENDS if one in result.free):
         size = f"wrong by {_mm(result.prior[end])}" if end in result.prior else "exact"
         what = "the frame of the poses" if frame == "frame" else "the measured body"
         lines.append(
-            f"{what} was found from the file's {end}, which are taken to be {size}: the standard deviations below "
+            f"{what} was found from the file's {end}, which are assumed to be {size}: the standard deviations below "
             "include its error"
         )
     kept = [name for name in ("anchors", "offsets") if name not in result.free]

@@ -79,7 +79,7 @@ def calibrate(
         if given.times is None:
             raise InputError(
                 f"measurements.times must be given to estimate {', '.join(of_forces)}, got none, and the poses look "
-                "like those of a motion; if they are at rest, give times more than 0.2 s apart"
+                "like a motion; if they are at rest, give times more than 0.2 s apart"
             )
         if "elasticity" in groups and given.tensions is None:
             raise InputError(

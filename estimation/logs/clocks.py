@@ -63,7 +63,7 @@ def clock_of_poses(
     if locked(lengths.values):
         if shared > 0:
             return None  # constant readings are the same at all times
-        raise InputError("lengths must change to align the clocks, got those of locked winches")
+        raise InputError("lengths must change to align the clocks, got readings of locked winches")
     if robot is None:
         raise InputError("robot must be given to align the clocks of lengths and poses, got None")
     return aligned(lengths, pose, robot, given, [one for one in from_ if one is source.recording])
@@ -93,7 +93,7 @@ def aligned(
         carriers = carriers_at(robot, of_poses, given, seen, len(rows), [])[0]
         kept = np.isfinite(carriers).all(axis=(1, 2))
         if not kept.any():
-            raise InputError(f"poses must include those of the carriers of {robot.name} to align clocks, got none")
+            raise InputError(f"poses must include the poses of the carriers of {robot.name} to align clocks, got none")
         rows, poses, carriers = rows[kept], poses[kept], carriers[kept]
         effects = [poses[:, :3], *np.swapaxes(carriers[..., :3], 0, 1)]
     if pose.values.shape[1] > 3:

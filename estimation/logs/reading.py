@@ -73,7 +73,7 @@ def read_measurements(
         path: File, or several. CSV has a header such as `t [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg],
             ..., tension0 [N]`; NetCDF is from `Measurements.save` or a simulation, or has variables named like these
             columns. Empty fields or nan mark poses that were not measured. Messages of usual types are recognised.
-        sigma: Standard deviations as for `Measurements`; default: those of the file if `Measurements.save` wrote it,
+        sigma: Standard deviations as for `Measurements`; default: as saved if `Measurements.save` wrote the file,
             otherwise the defaults of `Measurements`.
         poses: Log of the poses, if they are in another file; its clock is aligned by cable speeds.
         robot: Robot of the log, to align clocks and to find the poses of its moving carriers by their names.
@@ -159,14 +159,14 @@ def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
     there = np.asarray(np.isfinite(poses[..., :3]).any(axis=(0, 2)))
     lost = ", ".join(robot.carriers[i].name for i in moving if not there[i])
     if lost:
-        read.notes.append(f"the log has no poses of {lost}: taken to be at home")
+        read.notes.append(f"the log has no poses of {lost}: assumed to be at home")
     if not there[moving].any():
         return read
     poses[:, ~there], thrusts[:, ~there] = robot.carrier_home[~there], np.nan
     still = np.isnan(poses[..., 3:]).all(axis=(0, 2))
     if still.any():
         names = ", ".join(robot.carriers[i].name for i in np.flatnonzero(still))
-        read.notes.append(f"the log has no attitudes of {names}, which are taken to be those at home")
+        read.notes.append(f"the log has no attitudes of {names}, which are assumed to be as at home")
         poses[:, still, 3:], thrusts[:, still] = robot.carrier_home[still, 3:], np.nan
     kept = np.asarray(np.isfinite(poses).all(axis=(1, 2)))
     if not kept.any():
@@ -251,7 +251,7 @@ def measurements_of(
     notes = [note for one in from_ for note in one.notes]
     usual = [one for what in LETTERED if not (given and getattr(given, what)) for one in getattr(found, what)]
     if named := [one.full for one in usual if corner(one.full)]:
-        notes.append(f"columns are taken to be in the order of the cables: {', '.join(named)}; a map may change it")
+        notes.append(f"columns are assumed to be in the order of the cables: {', '.join(named)}; a map may change it")
     main_fields = found.lengths or found.position or found.directions
     main = main_fields[0]
     stated = main.recording.sigma
@@ -318,7 +318,9 @@ def measurements_of(
     sensors["orientations"] = orientation, found.orientation
     arguments |= {name: one.values[rows] for name, (one, recorded) in sensors.items() if one is not None and recorded}
     if found.orientation and not found.position and "rotation" not in (sigmas.get("sigma") or {}):
-        notes.append(f"orientations without positions are taken to be good to {quantity(np.degrees(AHRS), 'deg', 2)}")
+        notes.append(
+            f"orientations without positions are treated as accurate to {quantity(np.degrees(AHRS), 'deg', 2)}"
+        )
         known = sigmas.get("sigma", {})
         sigmas["sigma"] = {"rotation": AHRS, **(known if isinstance(known, Mapping) else {"lengths": known})}
     measured = Measurements(lengths.values[rows], **arguments, **sigmas)

@@ -72,7 +72,7 @@ def read_recorded(
     known = as_robot(robot)
     encoded, columns = known, np.arange(known.m)  # of the log, in the order of the cables
     if fix and any(carrier.moves for carrier in known.carriers):
-        raise InputError(f"fix must be False for a robot whose carriers move, as those of {known.name}, got True")
+        raise InputError(f"fix must be False for {known.name}, because its carriers move, got True")
     try:
         read = read_log(log, None, poses, known, fields, carriers=False)
         if read.fields.directions and not read.fields.position:  # from which poses follow

@@ -91,7 +91,7 @@ def _with_frames(columns: dict[str, np.ndarray], period: float | None) -> list[s
         return []
     count = np.arange(len(next(iter(columns.values()))), dtype=float)
     columns["time"] = period * next((column for name, column in columns.items() if name.lower() == "frame"), count)
-    return [f"times are those of frames {quantity(1e3 * period, 'ms', 4)} apart, as the file states above its columns"]
+    return [f"times are computed from frames that are {quantity(1e3 * period, 'ms', 4)} apart, by the header"]
 
 
 def from_netcdf(content: bytes, where: str) -> Recording:

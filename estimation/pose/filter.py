@@ -70,7 +70,7 @@ class PoseFilter(Displayed):
             in a second, relative to a reference if there is one. Default: 10 m/s^2.5, and 10 m/s^2.5
             divided by the robot's `length`. With less jerk the filter is slower, and its estimates less noisy; see
             `control.Filtered`.
-        sensor: Position of the inertial sensor in the platform frame, (3,) [m]; its axes are those of the platform.
+        sensor: Position of the inertial sensor in the platform frame, (3,) [m]; its axes are the axes of the platform.
 
     Raises:
         InputError: If an argument has a wrong value.
@@ -108,10 +108,10 @@ class PoseFilter(Displayed):
     def noise(self, rate: float) -> dict[str, float]:
         """Return the standard deviations that noise of the poses causes in the estimates, for `sensors` of controllers.
 
-        They are `position` [m], `attitude` [rad], `velocity` [m/s] and `attitude_rate` [rad/s]. The jerk that
-        the filter permits causes errors of about the same size. They are not included, because they change slowly, so
-        controllers do not amplify them. With white jerk q and noise of the density s = sigma / sqrt(rate), the filter
-        is a Butterworth filter of the bandwidth b = (q / s)^(1/3). The noise then causes the variance 5/3 s^2 b of its
+        They are `position` [m], `attitude` [rad], `velocity` [m/s] and `attitude_rate` [rad/s]. Errors that the
+        permitted jerk causes are of about the same size, but are not included: they change slowly, so that controllers
+        do not amplify them. With white jerk q and noise of the density s = sigma / sqrt(rate), the filter is a
+        Butterworth filter of the bandwidth b = (q / s)^(1/3). The noise then causes the variance 5/3 s^2 b of its
         position and 3/2 s^2 b^3 of its velocity.
 
         Args:
@@ -141,7 +141,7 @@ class PoseFilter(Displayed):
         """Return the estimate at `time`, with the measurements of that time; without any it is a prediction.
 
         Args:
-            time: Not before that of the last update [s].
+            time: Time, not before the last update [s].
             lengths: Cable lengths from anchor to attachment (m,) [m]; nan: not measured.
             pose: Measured pose (6,) [m, rad], for example by motion capture; nan: not measured.
             rate, acceleration: Angular velocity [rad/s] and specific force [m/s^2] of an inertial sensor in platform

@@ -57,7 +57,7 @@ class LogPoses(Displayed):
         times: Times of the poses on the clock of the lengths [s], (N,), or None.
         squares: Sum of all squared residuals of each sample, in standard deviations, (N,); None if lengths alone were
             measured.
-        more: Number of the residuals in a sample besides those of the lengths.
+        more: Number of the residuals in a sample besides the residuals of the lengths.
         excess: Factor by which these other residuals exceed their standard deviations.
         misread: Description of an error of the measured orientations, which is corrected; or None.
         mistake: Probable input error of the log, or None.
@@ -130,11 +130,11 @@ class LogPoses(Displayed):
         if self.misread:
             yield f"corrected: {self.misread}"
         if self.excess > 1.0:
-            yield f"residuals are {quantity(self.excess, digits=3)} times as large as stated, and so are the sigmas"
+            yield f"residuals are {quantity(self.excess, digits=3)} times as large as stated, so sigmas are too"
         if len(self.wrong) == 1 and not self.fits.any():
             if self.doubt:
                 return
-            yield "no pose fits the lengths of any sample: the robot file is not that of the log, or not calibrated"
+            yield "no pose fits the lengths of any sample: the robot file is of another robot, or not calibrated"
             return
         if np.any(self.estimate.by_gravity):
             moves = ""

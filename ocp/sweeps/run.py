@@ -58,7 +58,7 @@ def sweep(
             Keys that begin with `robot.` are keys of the robot file: `robot.platform.mass`. Items of lists are numbered
             from 0, `limits.keep_out[0].radius`; a key without a number means all items, `robot.cables.t_max`. A cable
             whose `t_max` is "cut" is left out of the robot. The keys `robot` and `task` vary the whole robot or task:
-            names or files. Where one does not fit the other, the row is `failed`.
+            names or files. If a task does not fit a robot, the row is `failed`.
         workers: Number of processes on this machine, with one thread each; 1: this process.
         scheduler: Address of a Dask scheduler whose workers are used instead (extra `cluster`).
         checkpoint: File to which each plan's row is appended as soon as it is computed.

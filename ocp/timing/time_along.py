@@ -78,12 +78,12 @@ def time_along(robot: AnyRobot, task: Task | dict[str, Any] | str | os.PathLike[
     turn; for all other paths the task's duration is ignored. Carriers rest or follow given paths with the same
     parameter s.
 
-    The task's limits on speeds and accelerations of platform, cables and carriers apply, and so do the robot file's
-    limits of winches and of mobile carriers that move. If winches have inertia, `force_max` limits the sum of the
-    tension and the force that accelerates the winch. The tension limits, reduced by the task's margin, enter as the
-    facets of the available wrench set. TOPP-RA computes the time law (H. Pham, Q.-C. Pham, "A new approach to
-    time-optimal path parameterization based on reachability analysis", IEEE T-RO 34(3), 2018): d2s/dt2 is constant
-    between grid points, so tensions jump there. The extra `timing` installs it.
+    The task's limits on speeds and accelerations of platform, cables and carriers apply, and the robot file's limits of
+    winches and of mobile carriers that move. If winches have inertia, `force_max` limits the sum of the tension and the
+    force that accelerates the winch. The tension limits, reduced by the task's margin, enter as the facets of the
+    available wrench set. TOPP-RA computes the time law (H. Pham, Q.-C. Pham, "A new approach to time-optimal path
+    parameterization based on reachability analysis", IEEE T-RO 34(3), 2018): d2s/dt2 is constant between grid points,
+    so tensions jump there. The extra `timing` installs it.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
@@ -92,11 +92,11 @@ def time_along(robot: AnyRobot, task: Task | dict[str, Any] | str | os.PathLike[
 
     Returns:
         Plan: Audited like every plan. Its task contains the time law, so `plan` audits the same motion again; `law`
-            contains the active limit on each part of the path (`bottlenecks`). If infeasible, no tensions inside their
-            limits give the required wrench at `law.at` at any speed and acceleration (at the ends: at rest); the motion
-            then has no time law: it only shows the path, and lasts 10 s. Or the path itself leaves the room, the floor
-            or the reach of a carrier (`audit.excess`). If not-found, every grid point allows some speed, but no time
-            law connects them, or none passes the audit.
+            contains the active limit on each part of the path (`bottlenecks`). Status `infeasible`: no tensions inside
+            their limits give the required wrench at `law.at`, whatever the speed and acceleration (at the ends: at
+            rest), or the path leaves the workspace box, the floor or the reach of a carrier (`audit.excess`). The
+            motion then only shows the path, in 10 s. Status `not-found`: every grid point allows some speed, but no
+            time law connects them, or none passes the audit.
 
     Raises:
         InputError: If an argument is invalid, the task does not fit the robot or has keys that a time law along a path

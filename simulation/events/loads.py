@@ -103,7 +103,7 @@ class Push(Lasting):
 
     @override
     def begin(self, running: Running) -> None:
-        """Find the carrier among those of the robot."""
+        """Find the carrier of the robot."""
         names = [carrier.name for carrier in running.plant.robot.carriers]
         self._body = 0 if self.carrier is None else 1 + names.index(self.carrier)
 

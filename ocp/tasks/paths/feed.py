@@ -37,7 +37,7 @@ class FeedPath(PathBase):
         "a file of points instead, .csv with units in its header or .gcode, relative to the task file",
     )
     origin: Vector3 | None = optional(FILE_ORIGIN)
-    feed: Positive | None = optional("speed [m/s]; default: that of each line of a .gcode file")
+    feed: Positive | None = optional("speed [m/s]; default: the feed of each line of a .gcode file")
     acceleration: Positive = Field(description="largest acceleration, along the path and across it in corners [m/s^2]")
     tolerance: NonNegative = optional(
         "largest distance at which the path passes a corner [m]; 0: stop at each corner", 1e-3
