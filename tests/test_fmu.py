@@ -14,10 +14,12 @@ import pytest
 import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
 import towline
 from towline import load, simulate
 from towline.base.errors import InputError
+from towline.cli.main import app
 from towline.control.planned_references import references_at
 from towline.control.trajectory import read_trajectory
 from towline.core import sense
@@ -27,7 +29,7 @@ from towline.plant import Plant
 from towline.plant.steps import default_drive, steps_in, windings_in
 
 from .c_programs import require
-from .units import Unit, each, motion, written
+from .units import Unit, compiled_once, each, motion, written
 from .warm import towline as run
 
 pytest.importorskip("fmpy", reason="the extra fmu installs FMPy")
@@ -192,14 +194,14 @@ def test_plant_and_controller_make_the_loop_of_simulate(name, step, unit):
     assert np.abs(found - run.record.motions[:, 0, :6]).max() < 1e-9
 
 
-def test_motors_of_winches_are_driven_as_in_simulate(unit, tmp_path, monkeypatch):
+def test_motors_of_winches_are_driven_as_in_simulate(unit, tmp_path, tmp_path_factory):
     """Pushed by 3 N; the unit computes its motors' forces by the same code."""
     data = load("point-mass-3").model_dump()
     winch = {"inertia": 3.0, "friction": 5.0, "speed_max": 50, "force_max": 1e4}
     data["cables"] = [cable | {"stiffness": 2e5, "winch": winch} for cable in data["cables"]]
     robot = Robot.model_validate(data)
-    monkeypatch.setenv("CFLAGS", "-O0")
-    towline.export_fmu(robot, tmp_path / "unit.fmu", "both")
+    with compiled_once(tmp_path_factory):
+        towline.export_fmu(robot, tmp_path / "unit.fmu", "both")
     one = unit(robot, "both", file=tmp_path / "unit.fmu")
     one.set(["wrench.force.x"], [3.0])
     expected = simulate(robot, robot.home, duration=0.1, disturbance=[3, 0, 0, 0, 0, 0]).record.motions[:, 0, :6]
@@ -331,11 +333,12 @@ def test_the_sources_alone_make_a_unit(tmp_path):
     assert unit_files(load(name), "both") == unit_files(load(name), "both")
 
 
-def test_the_command_writes_a_unit(tmp_path, monkeypatch):
+def test_the_command_writes_a_unit(tmp_path, tmp_path_factory, monkeypatch):
     require("cc")
-    monkeypatch.setenv("CFLAGS", "-O0")
-    done = run("export", "planar-4", "--fmu", "my crane.fmu", "--json", cwd=tmp_path)
-    found = json.loads(done.stdout)
+    monkeypatch.chdir(tmp_path)
+    with compiled_once(tmp_path_factory):
+        arguments = ["export", "planar-4", "--fmu", "my crane.fmu", "--json"]
+        found = json.loads(CliRunner().invoke(app, arguments, catch_exceptions=False).stdout)
     assert found["file"] == "my crane.fmu"
     names = zipfile.ZipFile(tmp_path / "my crane.fmu").namelist()
     assert {"modelDescription.xml", "sources/buildDescription.xml", "sources/plant/plant.c"} <= set(names)

@@ -28,6 +28,8 @@ from towline.layout import search
 from towline.models import carriers
 from towline.models.parsing import json_schema, parse_yaml
 
+from .units import compiled_once
+
 ROOT = Path(__file__).parent.parent
 PAGES = {str(path.relative_to(ROOT)): path.read_text() for path in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]}
 BLOCK = re.compile(
@@ -93,10 +95,15 @@ def print_nothing(canvas, form, file, dpi, metadata):
     file.write("<svg/>") if hasattr(file, "write") else file.write_bytes(b"")
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _compiled_once(tmp_path_factory):
+    with compiled_once(tmp_path_factory):
+        yield
+
+
 def run_page(page, folder, monkeypatch):
     """Run the blocks of a page in a folder; return the names that its Python defined."""
     monkeypatch.chdir(folder)
-    monkeypatch.setenv("CFLAGS", "-O0")  # of exported units: it changes no bit
     monkeypatch.setattr(search, "_SEARCHING", 0.0)  # of longer searches and larger audits, test_design.py has tests
     monkeypatch.setattr(search, "AUDITED", 10_000)
     monkeypatch.setattr(style, "_print", print_nothing)  # test_figures.py has tests of what is printed

@@ -1,7 +1,9 @@
 """Functional mock-up units for tests: written once, and run by FMPy."""
 
+import contextlib
 import hashlib
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,12 +18,12 @@ from .c_programs import require
 from .once import made_once
 
 
-def written(factory: pytest.TempPathFactory, robot: str, part: str, drive: str | None = None) -> Path:
-    """Write a unit of a robot once for all tests, at home, without optimisation, which changes no bit.
+@contextlib.contextmanager
+def compiled_once(factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Compile the units that are exported meanwhile without optimisation, which changes no bit.
 
-    Sources that units share are compiled once.
+    Sources that units share are compiled once for all tests.
     """
-    require("cc")
 
     def run(command: list[str], **options: Any) -> Any:
         sources, others = (
@@ -39,10 +41,18 @@ def written(factory: pytest.TempPathFactory, robot: str, part: str, drive: str |
 
         return subprocess.run([*flags, *map(compiled, sources), *others[len(flags) :]], **options)
 
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CFLAGS", "-O0")
+        patch.setattr(export, "subprocess", SimpleNamespace(run=run))
+        yield
+
+
+def written(factory: pytest.TempPathFactory, robot: str, part: str, drive: str | None = None) -> Path:
+    """Write a unit of a robot once for all tests, at home."""
+    require("cc")
+
     def make(folder: Path) -> None:
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setenv("CFLAGS", "-O0")
-            patch.setattr(export, "subprocess", SimpleNamespace(run=run))
+        with compiled_once(factory):
             export_fmu(robot, folder / "unit.fmu", part, drive)
 
     return made_once(factory, f"fmu-{robot}-{part}-{drive}", make) / "unit.fmu"
