@@ -17,8 +17,8 @@ from towline.estimation.pose.wrong_lengths import wrong_cables
 from towline.models import branches, points, pose_from_lengths
 from towline.models.dynamics import dynamics_of
 from towline.models.record import record_of
-from towline.statics import equilibria as statics
-from towline.statics.equilibria import equilibria
+from towline.statics import rest_near as near
+from towline.statics.equilibria import descend, equilibria
 
 from .framed import framed
 
@@ -462,12 +462,31 @@ def test_rests_take_a_few_newton_steps(monkeypatch):
     robot = load("multi-quadrotor-4")
     lengths = dynamics_of(robot).cable_lengths(robot.home) + np.array([0.02, -0.03, 0.0, 0.02])
     expected = pose_from_lengths(robot, lengths)
-    monkeypatch.setattr(statics, "NEWTON", 8)
-    monkeypatch.setattr(statics, "_descend", lambda *_: None)
+    monkeypatch.setattr(near, "NEWTON", 8)
+    monkeypatch.setattr(near, "descend", lambda *_: None)
     start = expected.pose + np.array([0.01, -0.01, 0.01, 0.05, -0.04, 0.03])
     quick = pose_from_lengths(robot, lengths, start)
     assert quick.converged
     np.testing.assert_allclose(quick.pose, expected.pose, atol=1e-8)
+
+
+def test_newton_finds_the_rests_of_least_energy_with_slack_cables(monkeypatch):
+    """A load rests on three of four cables if one is too long: many at once, as one by one by the energy."""
+    robot, rng = load("multi-quadrotor-4"), np.random.default_rng(2)
+    carriers = np.tile(robot.carrier_home, (200, 1, 1))
+    carriers[:, :, :3] += 0.2 * rng.normal(size=(200, 4, 3))
+    starts = robot.home + np.repeat([0.2, 0.05], 3) * rng.normal(size=(200, 6))
+    lengths = dynamics_of(robot).cable_lengths(robot.home + 0.02 * rng.normal(size=(200, 6)), carriers)
+    lengths[np.arange(200), rng.integers(4, size=200)] += np.abs(0.2 * rng.normal(size=200))
+    alone = [descend(robot, starts[row], carriers[row], lengths[row]) for row in range(0, 200, 10)]
+    monkeypatch.setattr(near, "descend", lambda *_: None)
+    rests, found = near.rests_near(robot, lengths, starts, carriers)
+    assert found.mean() > 0.95
+    assert (~rests.taut[found]).any(axis=1).mean() > 0.3
+    assert (rests.lengths - lengths)[found].max() < 1e-8
+    for row, one in zip(range(0, 200, 10), alone, strict=True):
+        if found[row] and one is not None:
+            np.testing.assert_allclose(rests.energy[row], one.energy, atol=1e-5)
 
 
 @pytest.mark.parametrize(("name", "most"), [("cogiro", 3.3), ("ipanema-1", 6.0)])

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from ..base.errors import InputError, TowlineError
 from ..models import Dynamics, Robot, points
-from ..statics.equilibria import rest_near
+from ..statics.rest_near import rest_near
 from ..workspace import StaticEquilibrium
 from ..workspace.nearest import nearest_feasible
 from .feasible_ranges import Strips

@@ -15,7 +15,8 @@ from ...models.batch import as_array
 from ...models.files import AnyRobot, as_robot
 from ...models.part import LARGEST
 from ...models.robot import Robot
-from ...statics.equilibria import Equilibrium, equilibria, rest_near, sensitivity
+from ...statics.equilibria import Equilibrium, equilibria
+from ...statics.rest_near import rests_near, sensitivity
 from .estimate import PoseEstimate, moved, unbounded
 from .parameter_errors import length_errors
 from .problem import Problem, problem_of
@@ -23,6 +24,7 @@ from .search import estimates
 
 SIGMA = 1e-3  # [m], of a measured length: what a winch with an encoder achieves
 MOST = 1e100  # [m]: larger ones, and inverses of smaller ones, cannot be squared beside lengths
+BLOCK = 1000  # equilibria that are computed together
 STEP = 1e-5  # of a numerical derivative, in radians, and times the platform's size
 
 
@@ -176,37 +178,42 @@ def resting(own: PoseEstimate, problem: Problem, lengths: np.ndarray, starts: np
     by_parameters = np.zeros_like(covariance) if robot.uncertainty else None
     near = own.pose if starts is None else starts
     carriers = np.broadcast_to(problem.carriers, (len(lengths), *robot.carrier_home.shape))
-    for row in hang:
-        rest = rest_near(robot, lengths[row], near[row], carriers[row])
-        if rest is None and few and starts is None:
-            rest = next(iter(equilibria(robot, lengths[row], carriers[row])), None)
-        if rest is not None:
-            own.pose[row], own.converged[row], by_gravity[row] = rest.pose, True, True
-            own.residuals[row] = rest.lengths - lengths[row]
-            own.residuals[row, rest.slack] = 0.0
-            by_length, by_file, neutral = _motions(robot, rest, lengths[row], carriers[row])
-            covariance[row] = unbounded((by_length * own.sigma**2) @ by_length.T, neutral)
-            if by_parameters is not None and robot.uncertainty is not None:
-                by_parameters[row] = by_file @ robot.uncertainty.matrix @ by_file.T
+    for first in range(0, hang.size, BLOCK):
+        rows = hang[first : first + BLOCK]
+        rests, found = rests_near(robot, lengths[rows], near[rows], carriers[rows])
+        if few and starts is None:
+            for k in np.flatnonzero(~found):
+                for rest in equilibria(robot, lengths[rows[k]], carriers[rows[k]])[:1]:
+                    rests.put(k, rest)
+                    found[k] = True
+        rows, rests = rows[found], rests.only(found)
+        own.pose[rows], own.converged[rows], by_gravity[rows] = rests.pose, True, True
+        own.residuals[rows] = np.where(rests.taut, rests.lengths - lengths[rows], 0.0)
+        by_length, by_file, neutral = _motions(robot, rests, lengths[rows], carriers[rows])
+        covariance[rows] = unbounded((by_length * own.sigma**2) @ by_length.swapaxes(1, 2), neutral)
+        if by_parameters is not None and robot.uncertainty is not None:
+            by_parameters[rows] = by_file @ robot.uncertainty.matrix @ by_file.swapaxes(1, 2)
     return replace(own, by_gravity=by_gravity, known_covariance=covariance, by_parameters=by_parameters)
 
 
-def _motions(robot: Robot, rest: Equilibrium, lengths: np.ndarray, carriers: np.ndarray) -> list[np.ndarray]:
-    """Return motions of the platform frame, as its shift and a small rotation in {G}, at an equilibrium.
+def _motions(robot: Robot, rests: Equilibrium, lengths: np.ndarray, carriers: np.ndarray) -> list[np.ndarray]:
+    """Return motions of the platform frame, as its shift and a small rotation in {G}, at N equilibria.
 
-    They are the derivatives by measured lengths, (6, m), and by the file's uncertain parameters, (6, p), and neutral
-    motions, (6, k). With the energy E = -m g c + sum t_i (l_i - L_i), a parameter acts like a change of lengths and the
-    wrench -d^2 E / (dpose dparameter).
+    They are the derivatives by measured lengths, (N, 6, m), and by the file's uncertain parameters, (N, 6, p), and
+    neutral motions, (N, 6, k). With the energy E = -m g c + sum t_i (l_i - L_i), a parameter acts like a change of
+    lengths and the wrench -d^2 E / (dpose dparameter).
     """
-    by_length, compliance, neutral = sensitivity(robot, rest, carriers)
+    by_length, compliance, neutral = sensitivity(robot, rests, carriers)
     step = STEP * np.diag([robot.length] * 3 + [1.0] * 3)
-    around = moved(rest.pose, np.vstack([np.zeros(6), step, -step]))  # (13, 6)
-    L, _ = length_errors(robot, around, np.tile(lengths, (13, 1)), np.tile(carriers, (13, 1, 1)))
-    pulled = np.einsum("i,nip->np", rest.tensions, L)
-    wrench = (pulled[7:] - pulled[1:7]) / (2 * np.diag(step)[:, None])
-    arm = points.rotations(rest.pose[3:]) @ np.array(robot.platform.com)
-    wrench[3:] -= np.cross(arm, wrench[:3], axis=0)  # about the CoM
-    motions = [by_length, compliance @ wrench - by_length @ L[0], neutral]
+    around = moved(rests.pose[:, None], np.vstack([np.zeros(6), step, -step]))  # (N, 13, 6)
+    flat = around.reshape(-1, 6), np.repeat(lengths, 13, axis=0), np.repeat(carriers, 13, axis=0)
+    L, _ = length_errors(robot, *flat)
+    L = L.reshape(len(lengths), 13, *L.shape[1:])
+    pulled = np.einsum("ni,nkip->nkp", rests.tensions, L)
+    wrench = (pulled[:, 7:] - pulled[:, 1:7]) / (2 * np.diag(step)[:, None])
+    arm = (points.rotations(rests.pose[:, 3:]) @ np.array(robot.platform.com))[..., None]  # (N, 3, 1)
+    wrench[:, 3:] -= np.cross(arm, wrench[:, :3], axis=1)  # about the CoM
+    motions = [by_length, compliance @ wrench - by_length @ L[:, 0], neutral]
     for of in motions:
-        of[:3] += np.cross(arm, of[3:], axis=0)  # of the CoM before
+        of[:, :3] += np.cross(arm, of[:, 3:], axis=1)  # of the CoM before
     return motions
