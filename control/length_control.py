@@ -40,11 +40,11 @@ class LengthControl(Controller):
         L0 = l(x) / (1 + s) + J (P e + I * integral of e)
 
     where s are the strains at which cables with the stiffness EA and the file's damping have the planned tensions, x is
-    the planned pose, J the Jacobian of the lengths, and e the error of the measured pose, whose rotation is a vector in
-    {G}, so that no attitude is special. Winches with a lag get the lengths with which they reach l(x) / (1 + s) at the
-    end of the period; e and its integral are extrapolated over the lag to first order. Tensions of a robot with
-    more cables than degrees of freedom follow from the lengths; they are not controlled. Winches that hold a length for
-    a long period move unevenly: `follow` warns if this stretches cables as much as the planned tensions do.
+    the planned pose, J the Jacobian of the lengths, and e the error of the measured pose, with a rotation vector in
+    {G}. Winches with a lag get the lengths with which they reach l(x) / (1 + s) at the end of the period; e and its
+    integral are extrapolated over the lag to first order. Tensions of a robot with more cables than degrees of freedom
+    follow from the lengths; they are not controlled. Winches that hold a length for a long period move unevenly:
+    `follow` warns if this stretches cables as much as the planned tensions do.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file. Its carriers must not fly.

@@ -56,8 +56,8 @@ class Predictive(ComputedTorque):
 
     The velocity that the model predicts for the commands is compared with the measured one (control/watch.py). The
     parallel `ComputedTorque` takes over until `reset` ("not as modelled") if a tenth of the weight, in addition to the
-    noise of `sensors`, is unexplained over about 50 ms, if there is no solution for that long, if noise of the velocity
-    requires more tension than the limits permit, if a carrier loses its thrust or turns too late
+    noise of `sensors`, is unexplained over about 50 ms, or if there is no solution for that long. It also takes over if
+    noise of the velocity requires more tension than the limits permit, if a carrier loses its thrust or turns too late
     (core/control/turning.c), or if a pitch goes beyond 1.5 rad. With a warning, it controls the robot from the start if
     the loop is unstable at home because carriers turn before they accelerate, as with cables that begin below the CoM.
 

@@ -50,8 +50,8 @@ def plan(
     their limits. Free quantities are chosen by inverse-dynamics transcription and IPOPT. Only the audit on a dense grid
     decides that a plan is feasible.
 
-    If the duration alone is free, so is the time law along the path: the path's own time law, stretched, competes with
-    the fastest one (`time_along`, if the extra `timing` is installed), and the task's objective decides.
+    If only the duration is free, the planner also chooses the time law by the task's objective: the path's own time
+    law, stretched, or the fastest one (`time_along`, if the extra `timing` is installed).
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
@@ -66,11 +66,10 @@ def plan(
             iterates, with limits tightened by the tension spread of the previous plan.
 
     Returns:
-        Plan: With status `feasible`; or `infeasible` if no motion that the task allows is feasible, proven by the
-            certificate or by a limit that every such motion exceeds; or `not-found`, with the certificate at the worst
-            time of the closest motion known, or with the limits that it exceeds. `Plan.stages` records the stages,
-            `Plan.infeasible_spans` the times without tensions, and `Plan.relaxations` suggests feasible variations: a
-            duration, or looser limits.
+        Plan: With status `feasible`; or `infeasible`, proven by the certificate or by a limit that every allowed motion
+            exceeds; or `not-found`, with the certificate of the closest motion known, or with the limits that it
+            exceeds. `Plan.stages` records the stages, `Plan.infeasible_spans` the times without tensions, and
+            `Plan.relaxations` suggests feasible variations: a duration, or looser limits.
 
     Raises:
         InputError: If the task or the start is invalid or does not fit the robot.

@@ -119,8 +119,8 @@ def simulate(
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
-        reference: A plan, the NetCDF file of one, a path (also as a mapping, as in a task), or a pose (6,) to hold; or
-            the path of a recording (CSV, MCAP, a bag, NetCDF without a plan), which `replay` repeats: all other
+        reference: A plan, the NetCDF file of one, a path (also as a mapping, as in a task), or a pose (6,) to hold. Or
+            the file of a recording (CSV, MCAP, a bag, NetCDF without a plan), which `replay` repeats: all other
             arguments must then be omitted, and the result is a `Replay`.
         controller: Controller (default: `ComputedTorque(robot)`). A single run calls its `reset` and uses the object
             itself. Many runs use copies, unless it accepts batches.
