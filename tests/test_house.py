@@ -151,8 +151,10 @@ def test_only_carriers_know_their_kinds():
     from towline.models.carriers import _KINDS
 
     classes = {kind.__name__ for kind in _KINDS.values()}
+    words = classes | {f'"{kind}"' for kind in _KINDS}  # files without any of them need not be parsed
     for file in {path for room in rooms() for path in (ROOT / room).rglob("*.py")} - {ROOT / "models" / "carriers.py"}:
-        for node in ast.walk(ast.parse(file.read_text())):
+        text = file.read_text()
+        for node in ast.walk(ast.parse(text if any(word in text for word in words) else "")):
             named = {getattr(node, "id", None), getattr(node, "attr", None), getattr(node, "name", None)}
             assert not named & classes, f"{file.relative_to(ROOT)} names {named & classes}"
             parts = ast.walk(node) if isinstance(node, ast.Compare | ast.Match) else ()
