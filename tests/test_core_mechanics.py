@@ -63,7 +63,7 @@ def test_lines_and_wrenches_are_those_of_the_symbolic_model(robot):
     _core.required_wrench(record_of(robot), pose, velocity, acceleration, wind, w)
     required = Dynamics(robot)._functions.function("required_wrench" if wind is None else "required_wrench_in_wind")
     weight, size = robot.force_scale, max(1.0, np.abs(lengths).max())
-    for row in range(COUNT):
+    for row in range(0, COUNT, 3):  # of every lane
         given = (pose[row], carriers[row])
         np.testing.assert_allclose(A[row], functions["wrench_matrix"](*given).full(), rtol=0, atol=1e-14 * size)
         np.testing.assert_allclose(

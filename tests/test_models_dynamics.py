@@ -74,7 +74,7 @@ def test_required_wrench_is_the_derivative_of_momentum(name):
     dynamics = Dynamics(robot)
     rng = np.random.default_rng(GENERATOR_SEED)
     com = np.array(robot.platform.com)
-    for _ in range(20):
+    for _ in range(8):
         coefficients, pose, velocity, acceleration = polynomial_motion(rng, 1.0)
 
         def com_at(time, coefficients=coefficients):

@@ -12,7 +12,7 @@ from towline.models.part import COORDINATES
 
 mujoco = pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")
 
-STATES = 200
+STATES = 60
 POINT_ANCHORED = [name for name in available() if all(cable.pulley is None for cable in load(name).cables)]
 
 
