@@ -18,9 +18,9 @@ TOUCH = 0.5  # pixels by which boxes of letters, which hold their descenders, ma
 
 
 def renderer_of(figure):
-    """Draw a figure, and return the renderer that knows its boxes."""
+    """Lay a figure out as it is drawn, without colouring pixels, and return the renderer that knows its boxes."""
     canvas = FigureCanvasAgg(figure)
-    canvas.draw()
+    figure.draw_without_rendering()
     return canvas.get_renderer()
 
 

@@ -59,8 +59,8 @@ def test_a_notebook_runs_and_says_the_same(path, kernel, tmp_path):
     assert {out.output_type for out in shown} <= {"stream", "display_data", "execute_result"}
     assert any("image/png" in out.get("data", {}) for out in shown)
     # It begins without the names of the notebook before, in a folder of its own. Figures are drawn once, not a second
-    # time for their margins.
-    once = "%matplotlib inline\n%config InlineBackend.print_figure_kwargs = {'bbox_inches': None}"
+    # time for their margins, and of few pixels.
+    once = "%matplotlib inline\n%config InlineBackend.print_figure_kwargs = {'bbox_inches': None, 'dpi': 20}"
     fresh.cells.insert(0, nbformat.v4.new_code_cell(f"%reset -f\n%cd -q {tmp_path}\n{once}"))
     NotebookClient(fresh, km=kernel, timeout=MOST_SECONDS).execute()
     words, numbers = verdicts(stored)

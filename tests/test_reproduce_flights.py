@@ -77,7 +77,8 @@ def drag(robot, air):
 
 
 def test_the_command_reproduces_the_paper(flown_once, tmp_path, monkeypatch):
-    monkeypatch.setattr(style, "svg", lambda figure: "<svg/>")  # each figure is printed into its file
+    monkeypatch.setattr(style, "svg", lambda figure: "<svg/>")  # each figure is printed into its file,
+    monkeypatch.setattr(style, "DPI", 20)  # of few pixels
     arguments = ["reproduce", "flying", "--out", str(tmp_path / "out"), "--json"]
     printed = json.loads(CliRunner().invoke(app, arguments, catch_exceptions=False).stdout)
     assert printed["complete"]
