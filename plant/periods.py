@@ -12,12 +12,12 @@ from .plant import Plant
 class Periods:
     """Run many simulations of a plant in parallel.
 
-    `record` is the robot as the core reads it, which events change in place.
+    `record` is the robot as the core reads it, which events change in place; `period` is the duration of one [s].
     """
 
     def __init__(self, plant: Plant, period: float, substeps: int):
         self.record, self._settings = plant.record.copy(), plant.settings
-        self._period, self._substeps, self._m = period, substeps, plant.robot.m
+        self.period, self._substeps, self._m = period, substeps, plant.robot.m
         self._conditions = layout.BODY * (1 + len(plant.robot.carriers)) + layout.CONDITION * self._m
 
     def lose(self, carrier: int) -> None:
@@ -58,4 +58,4 @@ class Periods:
         - `history`, `tensions`: results, (N, 2, n) and (N, 2, m) [N].
         """
         of_rows = (states, commands, history, tensions)
-        run_plant(self.record, self._settings, *of_rows, 1, self._period, self._substeps, 1)
+        run_plant(self.record, self._settings, *of_rows, 1, self.period, self._substeps, 1)

@@ -112,8 +112,6 @@ def fly(
             pushing += [(time, event)] if type(event).wrench is not Event.wrench else []
         states = running.states
         sense(periods.record, states, motions, lengths)
-        if pushing:
-            orders.push(_wrench(pushing, time, period, motions))
         reported = sensors.report(k, motions, pulls)
         if command is None or time >= running.silent_until:
             command = pilot.step(time, reported, reference)
@@ -131,6 +129,9 @@ def fly(
                 alive &= (np.abs(end) < BEYOND).all(axis=1)
                 states[alive] = end[alive]
                 sense(periods.record, states, between, lengths)
+            if pushing:
+                begins = time + part * periods.period
+                orders.push(_wrench(pushing, begins, periods.period, between if part else motions))
             try:
                 row = orders.rows(k, command, lengths, states, part)
             except (TypeError, ValueError):
@@ -159,14 +160,14 @@ def fly(
     return np.maximum(lasted, 1), pilot.seconds
 
 
-def _wrench(begun: Sequence[tuple[float, Event]], time: float, period: float, motions: np.ndarray) -> np.ndarray:
-    """Return what events exert on platform and carriers on average in the period from `time` on, (N, 1 + c, 6).
+def _wrench(begun: Sequence[tuple[float, Event]], time: float, step: float, motions: np.ndarray) -> np.ndarray:
+    """Return what events exert on platform and carriers on average in the step from `time` on, (N, 1 + c, 6).
 
-    An event begins with the first period after its time, and the last period counts in part, for the right impulse.
+    An event begins with the first period after its time, and its last step counts in part, for the right impulse.
     """
     total = np.zeros((*motions.shape[:2], 6))
     for begins, event in begun:
-        share = min((begins + event.until - event.at - time) / period, 1.0)
+        share = min((begins + event.until - event.at - time) / step, 1.0)
         if share > ROUNDING and (exerted := event.wrench(time, motions)) is not None:
             total += share * check_wrench(event, exerted, total.shape, time)
     return total

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isfinite
+from math import ceil, isfinite
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
 from warnings import warn
@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 
 LONGEST = 1e6  # periods of one flight
 MOST_RUNS = 10_000_000
+MOST_PARTS = 1000  # of a period
 
 
 AnyNoise: TypeAlias = Noise | dict[str, Any] | None
@@ -224,12 +225,19 @@ def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> t
     if meets.duration is None and not ends:
         raise InputError("duration must be the simulated time [s] if the reference is a pose, got None")
     lasting = max(ends) if meets.duration is None else meets.duration
-    periods = max(1, round(lasting / period))
+    if period > lasting * (1 + ROUNDING):
+        raise InputError(f"period must be at most the simulated time of {lasting:g} s, got {period:g} s")
+    periods = ceil(lasting / period - ROUNDING)  # to the end, or beyond it by less than one
     if periods > LONGEST:
         raise InputError(f"duration must be at most {LONGEST:g} periods of {period:g} s, got {lasting:g} s")
     for where, event in named:
         if event.at >= periods * period:
             raise InputError(f"{where} must begin before the end at {periods * period:g} s, got {event.at:g} s")
+        if not (step := event.longest_step(robot)) * MOST_PARTS >= period:
+            raise InputError(
+                f"{where} must change so slowly that it may be held for {period / MOST_PARTS:g} s, 1/{MOST_PARTS} of "
+                f"the period, got {step:.3g} s"
+            )
         if isinstance(event, Stick):
             _check_winches(robot, drive, where)
     mismatch = required("mismatch", meets.mismatch, Mismatch)
@@ -246,7 +254,7 @@ def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> t
         keep_out=next((part.keep_out for _, part in parts if part.keep_out), ()),
         doubt="; ".join(dict.fromkeys(part.doubt for _, part in parts if part.doubt)),
         mismatch=mismatch,
-        windings=windings_in(period, stiffest),
+        windings=max([windings_in(period, stiffest), *(ceil(period / each.longest_step(robot)) for each in happening)]),
     )
 
 

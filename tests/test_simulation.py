@@ -339,6 +339,11 @@ def test_a_plan_whose_loads_are_not_described_is_refused(crane):
         simulate("ipanema-1", loaded)
 
 
+def test_periods_that_do_not_divide_the_duration_reach_the_end_of_the_plan(crane):
+    run = simulate("ipanema-1", crane, period=0.13)
+    assert 23 * 0.13 < crane.duration <= run.lasted * 0.13 == pytest.approx(24 * 0.13)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -366,6 +371,11 @@ def test_a_plan_whose_loads_are_not_described_is_refused(crane):
         ({"gusts": 1}, "gusts"),
         ({"seed": -1}, "seed"),
         ({"period": 0}, "period"),
+        ({"period": 5}, "period must be at most the simulated time of 3 s, got 5 s"),
+        (
+            {"events": [{"kind": "wall", "at": 0, "point": [9, 0, 0], "normal": [-1, 0, 0], "stiffness": 1, "damping": 1e9}]},
+            "events[0] must change so slowly that it may be held for 1e-06 s, 1/1000 of the period, got",
+        ),
         ({"runs": 0}, "runs"),
         ({"controller": 3}, "controller"),
         ({"disturbance": [1, 2]}, "disturbance"),

@@ -104,6 +104,21 @@ def test_a_wall_carries_what_the_cables_do_not():
     assert stiffness * (x - gap) + constant[0, 0] * x == pytest.approx(push, rel=0.02)
 
 
+@pytest.mark.parametrize(("stiffness", "period"), [(1e4, 5e-3), (1e6, 5e-3), (1e8, 1e-3)])
+def test_a_wall_without_damping_gives_back_the_energy_of_an_impact(robot, stiffness, period):
+    """With constant tensions, the platform leaves it as fast as it came; it enters a soft one as far as energy says."""
+    mass, turns = robot.platform.mass, np.sqrt(robot.platform.mass / stiffness)
+    wall = Wall(at=0.0, point=(0.1, 0, robot.home[2]), normal=(-1, 0, 0), stiffness=stiffness)
+    push, duration = Push(force=(40 * mass, 0, 0), at=0.0, duration=0.02), 0.15 + 4 * turns
+    run = simulate(robot, robot.home, OpenLoop(robot), duration=duration, period=period, events=[wall, push])
+    x, speed = run.record.motions[:, 0, [0, 6]].T
+    assert speed.min() == pytest.approx(-speed.max(), rel=0.01)
+    if turns > 10 * period:
+        fastest, cables, depth = np.argmax(speed), stiffness_at_home(robot)[0, 0], x.max() - 0.1
+        energy = mass * speed[fastest] ** 2 + cables * x[fastest] ** 2
+        assert stiffness * depth**2 + cables * x.max() ** 2 == pytest.approx(energy, rel=0.01)
+
+
 def test_a_wall_never_pulls(robot):
     wall = Wall(at=0.0, point=(0, 0, 0), normal=(0, 0, 3), stiffness=100.0, damping=1e4, radius=0.1)
     motions = np.zeros((3, 2, 12))

@@ -96,14 +96,18 @@ class Event(Part, ABC):
     def begin(self, running: Running) -> None:
         """Change the running simulation once, as the event begins."""
 
+    def longest_step(self, robot: Robot) -> float:
+        """Return the longest time for which a value of `wrench` may be held [s]; infinity (default): any period."""
+        return inf
+
     def wrench(self, time: float, motions: np.ndarray) -> np.ndarray | None:
-        """Return force [N] and moment about the CoM [N m] on the platform in {G}, (6,) or (N, 6), for one period.
+        """Return force [N] and moment about the CoM [N m] on the platform in {G}, (6,) or (N, 6), for one step.
 
         With three dimensions, (N, 1 + c, 6), they act on the platform and on the carriers, whose motion they change
-        if these have mass.
+        if these have mass. A step is a period of the controller or a part of it, see `longest_step`.
 
         Args:
-            time: Time at which the period begins [s].
+            time: Time at which the step begins [s].
             motions: Poses of platform and carriers then, and their derivatives, in N runs: (N, 1 + c, 12).
         """
         return None

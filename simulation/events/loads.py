@@ -1,7 +1,7 @@
 """Loads on the platform: `Carry`, what it picks up or releases; `Push`, a force for some time; and a `Wall`."""
 
 from abc import ABC
-from math import inf
+from math import inf, sqrt
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -17,6 +17,7 @@ from ...models.robot import Robot
 from .event import Event, Running, Seconds, number_in
 
 ROUNDING = 1e-9  # of a force or moment, which may have been computed
+PART = 0.2  # of the time constants of a wall: longest step
 
 
 class Carry(RigidLoad, Event):
@@ -130,8 +131,8 @@ class Wall(Lasting):
     """A plane that pushes the platform away, with a spring and a damper and without friction.
 
     It touches the ball of the given radius about the origin of the platform frame. The force acts along the normal and
-    through the CoM; it never pulls. It is computed once in each period of the controller, which limits the stiffness
-    for which a contact is stable: sqrt(stiffness / mass) times the period should be at most 0.3.
+    through the CoM; it never pulls. In each step it is the mean while the platform moves on with its velocity, so that
+    a wall without damping gives back the energy of an impact.
     """
 
     kind: Literal["wall"] = "wall"
@@ -140,6 +141,7 @@ class Wall(Lasting):
     stiffness: Positive = Field(description="force per depth [N/m]")
     damping: NonNegative = optional("force per speed into the wall [N s/m]", 0.0)
     radius: NonNegative = optional("radius of the ball that touches the wall [m]", 0.0)
+    _step: float = PrivateAttr(default=0.0)  # for which a force is held [s]
 
     @model_validator(mode="after")
     def _has_normal(self) -> Self:
@@ -152,13 +154,29 @@ class Wall(Lasting):
         return f"a wall of {quantity(self.stiffness, 'N/m')} appeared"
 
     @override
+    def longest_step(self, robot: Robot) -> float:
+        """Return a fifth of the time in which a contact changes [s]."""
+        mass = robot.platform.mass
+        return PART * min(sqrt(mass / self.stiffness), mass / self.damping if self.damping else inf)
+
+    @override
+    def begin(self, running: Running) -> None:
+        """Take the step of the simulation."""
+        self._step = running.periods.period
+
+    @override
     def wrench(self, time: float, motions: np.ndarray) -> np.ndarray:
         """Return the force [N] on the platforms of N runs, with no moment, (N, 6), the same at each time [s]."""
         normal = np.array(self.normal) / np.linalg.norm(self.normal)
         position, velocity = motions[:, 0, :3], motions[:, 0, 6:9]
         # Not by BLAS, whose rounding of a run depends on how many there are.
-        depth = self.radius - ((position - np.array(self.point)) * normal).sum(axis=1)
-        force = np.where(depth > 0, self.stiffness * depth - self.damping * (velocity * normal).sum(axis=1), 0.0)
+        begins = self.radius - ((position - np.array(self.point)) * normal).sum(axis=1)
+        speed = -(velocity * normal).sum(axis=1)
+        ends = begins + self._step * speed
+        deeper, change = np.maximum(begins, ends), np.abs(ends - begins)
+        share = np.where(deeper > 0, np.minimum(deeper / np.where(change > 0, change, deeper), 1.0), 0.0)  # in contact
+        depth = (np.maximum(begins, 0.0) + np.maximum(ends, 0.0)) / 2
+        force = share * (self.stiffness * depth + self.damping * speed)
         result = np.zeros((len(motions), 6))
         result[:, :3] = np.maximum(force, 0.0)[:, None] * normal
         return result
