@@ -5,8 +5,10 @@ positions and velocities have the noise s_x and s_v, keeps
 
     (w + K) T <= 1        w^2 s_x + (2 w + K) s_v <= 0.05 g
 
-Two standard deviations of the tensions that noise of velocities requires are inside the limits at home. At about twice
-these bounds robots were lost in simulations with an independent plant.
+Defaults keep 0.03 g on robots with at least as many cables as degrees of freedom, whose winches follow the noise.
+States without a time are predicted over the known delay. It may be wrong by 30 %, and T is twice that. Two standard
+deviations of the tensions that noise of velocities requires are inside the limits at home. At about twice these bounds
+robots were lost in simulations with an independent plant.
 
 The attitude loops of flying carriers, phi'' = -2 h phi' - h^2 phi, are stable up to h lag = 2 with drives that lag
 (Routh), up to h delay = 0.647 with late states (their phase where the gain is 1), and up to h period = 1 with states
@@ -28,14 +30,17 @@ from ..base.text import quantity
 from ..models.parsing import validate
 from ..models.robot import Robot
 from .lag import ROTORS_KEEP, WINCHES_KEEP
+from .late_states import OLDEST
 from .noise import Noise
 from .settings import limits_of, positive
-from .watch import OFTEN
-from .weights import ripple
+from .watch import KNOWN, OFTEN, WINDOW
+from .weights import accelerations, ripple
 
 NOISE = 0.05  # of gravity: acceleration by noise of the measured state
 LOST, UNSTABLE = 2.0, 1.5  # times the bounds: robots are lost
 DELAY, PERIOD = 0.647, 1.0  # times the inverse of h: where a late or a held state alone makes attitude loops unstable
+CALM = 0.03  # the same where winches have to follow the noise, as long as it leaves `LEAST` of the usual bandwidths
+MISTOLD = 0.6  # of a known delay: twice what may be wrong about it, over which states without a time are not predicted
 LEAST = 0.1  # of the usual bandwidths: with less a robot does not follow
 READINGS = 1e3  # [1/s], without a rate
 GRAVITY, TINY = 9.81, 1e-12  # [m/s^2]; what divides
@@ -63,11 +68,15 @@ PATIENT, STILL = Usual(40.0, 60.0, 2.0, 0.03), Usual(40.0, 60.0, 2.0, 0.015)
 
 
 class Bandwidths(NamedTuple):
-    """Bandwidths [rad/s]: of the error, (6,), of the observers, and of the attitude loops of flying carriers."""
+    """Bandwidths [rad/s]: of the error, (6,), of the observers, and of the attitude loops of flying carriers.
+
+    `lead`: by which factor commands to winches may amplify the noise of the tensions.
+    """
 
     bandwidth: np.ndarray
     observer: float
     attitude: float
+    lead: float = np.inf
 
 
 def bandwidths_for(
@@ -100,7 +109,7 @@ def bandwidths_for(
             f"sensors must permit at least {quantity(100 * LEAST, '%')} of the default bandwidths, {usual.bandwidth:g} "
             f"and {usual.observer:g} rad/s, got {reason}, which permits {quantity(100 * part, '%', 2)}"
         )
-    part = min(part, usual.most)
+    part = min(part, usual.most, max(errors.permit_noise(usual.bandwidth, usual.observer, errors.calm), LEAST))
     given = np.full(6, part * usual.bandwidth) if w is None else w, part * usual.observer if K is None else K
     part, reason = errors.permit(float(given[0].max()), given[1])
     if LOST * part < 1.0:
@@ -108,7 +117,8 @@ def bandwidths_for(
             f"bandwidth and observer must be at most {LOST * part * given[0].max():.2g} and "
             f"{LOST * part * given[1]:.2g} rad/s with {reason}, got {given[0].max():g} and {given[1]:g} rad/s"
         )
-    return Bandwidths(*given, _attitude_for(robot, errors, lag, h))
+    lead = max(errors.permit_noise(float(given[0].max()), given[1], errors.calm), 1.0)
+    return Bandwidths(*given, _attitude_for(robot, errors, lag, h), lead)
 
 
 def _attitude_for(robot: Robot, errors: "_Errors | None", lag: float, given: float | None) -> float:
@@ -139,14 +149,20 @@ def place_for(attitude: float, place: float | None) -> float:
     return min(PLACE, attitude / CASCADE) if place is None else number("place", place, 0.1, 1e3)
 
 
-def noise_of_velocity(robot: Robot, sensors: Noise | Mapping[str, Any] | None) -> float:
-    """Return the standard deviation of the measured velocity, of all coordinates together [m/s]; 0 without `sensors`.
+def noise_of_change(robot: Robot, sensors: Noise | Mapping[str, Any] | None) -> float:
+    """Return the standard deviation of an unexplained change of velocity, of all coordinates together [m/s].
 
-    Rates of angles are multiplied by the robot's length. Raises `InputError` if `sensors` has a wrong value.
+    It is that of the difference of two measured velocities, and of their prediction over the `WINDOW` of a `Watch` with
+    measured tensions; 0 without `sensors`. Rates of angles are multiplied by the robot's length. Raises `InputError` if
+    `sensors` has a wrong value.
     """
     if sensors is None:
         return 0.0
-    return float(np.linalg.norm(robot.dof_mask * np.repeat(_errors_of(noise_of(sensors), robot).velocities, 3)))
+    noise, scale = noise_of(sensors), robot.dof_mask * np.repeat([1.0, robot.length], 3)
+    measured = np.sqrt(2) * np.linalg.norm(robot.dof_mask * np.repeat(_errors_of(noise, robot).velocities, 3))
+    by_tensions = float(np.linalg.norm(scale[:, None] * accelerations(robot))) * (robot.fixed_lengths is None)
+    predicted = KNOWN * by_tensions * noise.of_tensions * np.sqrt(WINDOW / (noise.rate or READINGS))
+    return float(np.hypot(measured, predicted))
 
 
 def noise_of(sensors: Any) -> Noise:
@@ -167,25 +183,31 @@ class _Errors(NamedTuple):
     late: float  # what of the age and of lags is not predicted
     position: float
     velocities: np.ndarray  # (2,), of the position and by rates of angles
+    calm: float  # largest acceleration by noise of default bandwidths, of gravity
     ripple: float  # two standard deviations of tensions by velocities, of their distance from limits [s]
 
     def permit(self, bandwidth: float, observer: float) -> tuple[float, str]:
         """Return by which factor both bandwidths may be multiplied, and what does not permit more."""
         by_age = 1.0 / max((bandwidth + observer) * self.late, TINY)
-        velocity = float(self.velocities.max())
-        a, b = bandwidth**2 * self.position, (2 * bandwidth + observer) * velocity
-        by_noise = 2 * NOISE * GRAVITY / max(b + np.sqrt(b * b + 4 * a * NOISE * GRAVITY), TINY)
-        by_noise = min(by_noise, 1.0 / max((2 * bandwidth + observer) * self.ripple, TINY))
+        by_noise = self.permit_noise(bandwidth, observer, NOISE)
         if by_age < by_noise:
             return by_age, f"a state that is {quantity(self.late, 's')} late"
+        velocity = float(self.velocities.max())
         return by_noise, f"noise of {quantity(self.position, 'm')} and {quantity(velocity, 'm/s')}"
+
+    def permit_noise(self, bandwidth: float, observer: float, most: float) -> float:
+        """Return by which factor both may be multiplied until noise accelerates by `most`, of gravity."""
+        a, b = bandwidth**2 * self.position, (2 * bandwidth + observer) * float(self.velocities.max())
+        by_noise = 2 * most * GRAVITY / max(b + np.sqrt(b * b + 4 * a * most * GRAVITY), TINY)
+        return min(by_noise, 1.0 / max((2 * bandwidth + observer) * self.ripple, TINY))
 
 
 def _errors_of(noise: Noise, robot: Robot) -> _Errors:
     """Return the errors of sensors; angles count by the robot's length."""
     step, size = 1.0 / (noise.rate or READINGS), np.array([1.0, robot.length])
     age, position = age_of(noise), noise.of_pose
-    late = 0.0 if noise.stamped else age
+    predicted = (1 - MISTOLD) * noise.delay if age <= OLDEST else 0.0
+    late = 0.0 if noise.stamped else age - predicted
     velocity = np.array([noise.velocity, noise.attitude_rate])
     if noise.differenced:
         late, velocity = late + step / 2, np.hypot(velocity, np.sqrt(2) * position / step)
@@ -193,4 +215,5 @@ def _errors_of(noise: Noise, robot: Robot) -> _Errors:
     strict = robot.fixed_lengths is None and robot.m >= len(robot.platform.dof)
     of_tensions = ripple(robot, limits_of(robot, None), np.repeat(velocity, 3)) if strict and velocity.any() else None
     most = 0.0 if of_tensions is None else OFTEN * float(np.linalg.norm(of_tensions, axis=1).max())
-    return _Errors(age, step if noise.rate else 0.0, late, float((size * position).max()), size * velocity, most)
+    limit = CALM if strict else NOISE
+    return _Errors(age, step if noise.rate else 0.0, late, float((size * position).max()), size * velocity, limit, most)

@@ -22,7 +22,7 @@ from .controllability import uncontrolled
 from .controller import Controller
 from .deviation import Deviation
 from .fallback import NEGLIGIBLE, answer_others
-from .lag import ROTORS_KEEP, WINCHES_KEEP, Lead, RotorLead
+from .lag import WINCHES_KEEP, RotorLead, tension_lead
 from .late_states import OLDEST, LateStates
 from .noise import Noise
 from .one_at_a_time import OneAtATime
@@ -140,10 +140,9 @@ class ComputedTorque(Controller):
         self._slow_loops = SlowLoops(self._settings, bandwidth is None, usual.bandwidth)
         self._usual_longest = self._slow_loops.longest
         loop, lag = number("tension_loop", tension_loop, 0.0, 1e3), number("tension_lag", tension_lag, 0.0, 1.0)
-        left = WINCHES_KEEP
-        if self.robot.fixed_lengths is not None:  # tensions lag as thrusts do in spite of their lead
-            lag, left = min(rotors, ROTORS_KEEP), 0.0
-        self._ahead = Lead(lag, left or ROTORS_KEEP, *self._limits) if lag > left else None
+        self._ahead = tension_lead(self.robot, self._limits, lag, rotors)
+        if self._ahead is not None:
+            self._ahead.amplify(loops.lead)
         self._loop = TensionLoop(loop, WINCHES_KEEP if self._ahead is None else 0.0, *self._limits) if loop else None
         self._little = np.maximum(self._limits.low, SOMETHING * self._limits.high)
         self._boxes = boxes(self.robot) if far.any() else None

@@ -1,4 +1,7 @@
-"""First-order lags: `Lag`, how drives follow commands, and `Lead`, commands that make up for a known one."""
+"""First-order lags: `Lag`, how drives follow commands, and `Lead`, commands that make up for a known one.
+
+`tension_lead` is the lead of a robot's tensions, `RotorLead` that of the actuators of its flying carriers.
+"""
 
 from typing import Any
 
@@ -7,6 +10,7 @@ from typing_extensions import override
 
 from ..models.part import inertia_matrix
 from ..models.robot import Robot
+from .settings import Limits
 
 SHORTEST = 1e-9  # [s], which divides
 WINCHES_KEEP, ROTORS_KEEP = 0.005, 0.015  # [s]: what leads leave of their lags
@@ -47,6 +51,10 @@ class Lead:
         self._ratio, self._lag, self._limits, self._rate = max(lag / left, 1.0), lag, (low, high), rate
         self.reset()
 
+    def amplify(self, most: float) -> None:
+        """Multiply noise of what the drives should give by `most`, from 1 on, at most; more of the lag remains then."""
+        self._ratio = min(self._ratio, most)
+
     def reset(self) -> None:
         """Forget all earlier steps."""
         self._given, self._sent = Lag(self._lag), np.zeros(0)
@@ -68,6 +76,18 @@ class Lead:
     def agree(self, other: "Lead") -> None:
         """Take over what another one has sent."""
         self._given.value, self._sent = other._given.value, other._sent
+
+
+def tension_lead(robot: Robot, limits: Limits, winches: float, rotors: float) -> Lead | None:
+    """Return the lead of commands to winches that lag [s], None if their lag is negligible.
+
+    Cables of fixed length have no winches. Their tensions lag as thrusts do in spite of the lead of the `rotors` [s],
+    and no command is sent that could be ahead.
+    """
+    if robot.fixed_lengths is None:
+        return Lead(winches, WINCHES_KEEP, *limits) if winches > WINCHES_KEEP else None
+    remaining = min(rotors, ROTORS_KEEP)
+    return Lead(remaining, ROTORS_KEEP, *limits) if remaining else None
 
 
 class RotorLead(Lead):

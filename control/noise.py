@@ -42,6 +42,11 @@ class Noise(Part):
         return np.hypot(np.array([self.position, self.attitude]), steps)
 
     @property
+    def of_tensions(self) -> float:
+        """Return the standard deviation of tensions [N], that of their resolution included."""
+        return float(np.hypot(self.tension, self.tension_resolution / np.sqrt(12)))
+
+    @property
     def bias_of_motion(self) -> np.ndarray:
         """Return the standard deviations of the biases of pose [m, rad] and velocity, (12,)."""
         return np.repeat([self.position_bias, self.attitude_bias, 0.0, 0.0], 3)

@@ -17,13 +17,13 @@ from ..solvers.horizon import Horizon
 from ..solvers.in_place import InPlace
 from ..statics.distribution import tensions as tensions_at
 from .as_floats import ROUNDING, as_floats
-from .bandwidths import PATIENT, STILL, TEAM, TOWING, bandwidths_for, noise_of_velocity
+from .bandwidths import PATIENT, STILL, TEAM, TOWING, bandwidths_for, noise_of_change
 from .carrier_references import moved_coordinates
 from .command import HOLD, OTHERWISE, SHIFTED, SOFT, Command
 from .computed_torque import ComputedTorque
 from .keep_out import Surroundings
 from .noise import Noise
-from .preview import STEEPEST, Preview, turns
+from .preview import STEEPEST, Preview, later, turns
 from .settings import reach_of, set_reach
 from .stability import grows
 from .state import Reference, State
@@ -144,6 +144,8 @@ class Predictive(ComputedTorque):
         loops |= {"tension_loop": tension_loop, "tension_lag": tension_lag, "rotor_lag": rotor_lag}
         super().__init__(the_robot, observer=own.observer, reach=reach, **loops)
         self._known_age, self._beside._ahead = self._beside._known_age, None  # drives do not follow its commands
+        if self._ahead is not None:
+            self._ahead.amplify(own.lead)
         set_reach(self._settings, reacts)
         self._followed, self._far = np.flatnonzero(flies & ~far.any(axis=1)), (far, flies)
         # Cables of a fixed length have the tensions that carriers make of them, whatever is commanded.
@@ -154,7 +156,7 @@ class Predictive(ComputedTorque):
         self._surroundings = Surroundings(self.robot, tube, keep_out)
         scale = np.repeat([1.0, self.robot.length], 3) * self.robot.dof_mask
         loud = None if correct else ripple(self.robot, self._limits, 2 * self._bandwidth + self._settings["observer"])
-        blind, noise = BLIND if self._has_winches else QUICK, noise_of_velocity(self.robot, sensors)
+        blind, noise = BLIND if self._has_winches else QUICK, noise_of_change(self.robot, sensors)
         self._watch = Watch(scale, self.robot.force_scale / self.robot.platform.mass, noise, loud, blind)
         self._from_the_start: HandOver | None = None
         self._steps, self._adapts = np.array([np.nan]), stage is None
@@ -368,13 +370,8 @@ class Predictive(ComputedTorque):
         self, time: float, start: np.ndarray, wanted: np.ndarray, planned: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the states and controls for the linearisation: the last solution, or a decay of the error."""
-        late, count = (time - self._solved) / self._steps[0], len(self._steps)
         if time - self._solved <= self._times[-1]:  # as where a command is taken from it
-            first = np.minimum(np.arange(count + 1) + int(late), count)
-            second, share = np.minimum(first + 1, count), late - int(late)
-            states = (1 - share) * self._guess[0][first] + share * self._guess[0][second]
-            first, second = np.minimum(first[:-1], count - 1), np.minimum(second[:-1], count - 1)
-            controls = (1 - share) * self._guess[1][first] + share * self._guess[1][second]
+            states, controls = (later(part, (time - self._solved) / self._steps[0]) for part in self._guess)
             states[:, 3:6] += turns(start[3:6] - states[0, 3:6])
         else:
             states, controls = wanted.copy(), np.zeros(self._guess[1].shape)

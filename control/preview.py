@@ -145,6 +145,13 @@ def turns(off: np.ndarray) -> np.ndarray:
     return 2 * np.pi * np.rint(off / (2 * np.pi))
 
 
+def later(rows: np.ndarray, steps: float) -> np.ndarray:
+    """Return rows, (K, ...), of a number of `steps` later, interpolated linearly; after the last one it stays."""
+    first = np.minimum(np.arange(len(rows)) + int(steps), len(rows) - 1)
+    second, share = np.minimum(first + 1, len(rows) - 1), steps - int(steps)
+    return (1 - share) * rows[first] + share * rows[second]
+
+
 def rows_at(rows: Rows, after: np.ndarray, before: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
     """Interpolate references every `period` [s]: return motions (N, 3, d) and tensions (N, m).
 

@@ -82,8 +82,8 @@ class Watch:
       locked coordinates.
     - `usual`: acceleration of the platform by the robot's force scale [m/s^2]: `BOUND` times this is permitted, and a
       step without a solution is treated as an unexplained acceleration of at least this size.
-    - `noise`: standard deviation of the known noise of the scaled velocity, of all coordinates together [m/s]. The
-      difference of two velocities has the square root of two of it, which is permitted as well.
+    - `noise`: standard deviation of what known noise of sensors adds to the difference over the window, of all
+      coordinates together [m/s], which is permitted as well.
     - `ripple`: tensions commanded for unit rates of the pose, relative to the distance of tensions from their limits,
       (m, 6) [s/m, s/rad]. The limits clip the effect of rate noise, more on one side than on the other, so `OFTEN`
       standard deviations beyond the limits are a reason to hand over. Default: noise is ignored.
@@ -100,7 +100,7 @@ class Watch:
         blind: float = BLIND,
     ):
         self._scale, self._blind = scale, blind
-        self._bound = BOUND * usual + sqrt(2) * noise / WINDOW
+        self._bound = BOUND * usual + noise / WINDOW
         self._ripple = None if ripple is None else (OFTEN * ripple) ** 2
         self.reset()
 

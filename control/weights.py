@@ -85,6 +85,12 @@ def ripple(robot: Robot, limits: Limits, bandwidth: np.ndarray) -> np.ndarray | 
     return asked / np.maximum(room, ROOM * limits.high)[:, None]
 
 
+def accelerations(robot: Robot) -> np.ndarray:
+    """Return how unit tensions accelerate the pose at home, (6, m) [m/(s^2 N), rad/(s^2 N)]."""
+    A, M = _at_home(robot)
+    return np.linalg.pinv(M * robot.dof_mask, INDEPENDENT) @ A
+
+
 def _at_home(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """Return wrench matrix (6, m) and wrenches of unit accelerations (6, 6), with moments divided by the length."""
     dynamics, rest = dynamics_of(robot), np.zeros(6)
