@@ -12,13 +12,11 @@
 """
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 from ..base.text import quantity
-from .audits.audit import Audit, audit, other_tensions_exist, other_tensions_may_pass
+from .audits.audit import audit, other_tensions_exist, other_tensions_may_pass
 from .audits.violation import cost, relative_violation
 from .global_path.global_path import motion_past
 from .nlp.rows import Mesh
@@ -26,19 +24,14 @@ from .plan import Plan
 from .proofs.durations import Durations
 from .proofs.infeasible_ends import infeasible_ends
 from .proofs.too_little_power import too_little_power
-from .result import Offers, Relaxed
+from .search.feasible_changes import feasible_changes
 from .search.homotopy import from_easier
-from .search.largest_share import largest_share
 from .search.reference import about_better_reference
 from .search.refinement import refine
-from .search.relaxations import near_fixed_motion
 from .search.search import Search
-from .search.slower import longer_phases, slower_rate
-from .search.stronger_or_nearer import near_chosen_motion, stronger_or_nearer
 from .search.time_law import BOUND
 from .tasks.deviation import Deviation
 from .tasks.ends import between_fixed_values
-from .tasks.scenario import Scenario
 from .tasks.status import MotionStatus
 from .tasks.wind_set import WindDisc
 
@@ -79,8 +72,8 @@ def _fixed_motion(search: Search) -> Plan:
     if not audit.passed and other_tensions_may_pass(search.scenario, audit):
         if proven := too_little_power(search.scenario):
             audit = replace(audit, excess=proven)
-            left = _durations(search)
-            offers = partial(_offered, _near_fixed, search, search.scenario, left, audit)
+            _durations(search)
+            offers = partial(feasible_changes, search, search.scenario, None, audit)
             return Plan(search.scenario, status, None, audit, build_s=0.0, solve_s=spent, offers=offers)
         chosen = _free_motion(search, None)
         if relative_violation(chosen.scenario, chosen.audit) < relative_violation(search.scenario, audit):
@@ -97,21 +90,8 @@ def _fixed_motion(search: Search) -> Plan:
         return chosen if chosen.feasible and cost(chosen) < cost(plan) else plan
     if isinstance(search.scenario.wind_set, WindDisc) and audit.certificate is None and not audit.excess:
         plan = replace(plan, status=MotionStatus.NOT_FOUND, reason=UNPROVEN)
-    left = _durations(search)
-    return replace(plan, offers=partial(_offered, _near_fixed, search, search.scenario, left, audit))
-
-
-def _offered(find: Callable[..., list[Relaxed]], search: Search, *about: Any) -> Offers:
-    """Return the relaxations that `find` finds, and whether it had to stop."""
-    return Offers(find(search, *about), search.cut_short)
-
-
-def _near_fixed(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
-    """Return feasible variations of a task that fixes the motion, or else of where it ends and of the robot."""
-    near = near_fixed_motion(search, scenario, left, audit)
-    phases, rate = longer_phases(search, scenario, audit), slower_rate(scenario)
-    others = largest_share(search, rate, rates=True) + near if near else stronger_or_nearer(search, scenario, audit)
-    return phases + others
+    _durations(search)  # a stage of the report
+    return replace(plan, offers=partial(feasible_changes, search, search.scenario, None, audit))
 
 
 def _durations(search: Search) -> Durations | None:
@@ -135,8 +115,7 @@ def _blocked(search: Search) -> Plan | None:
     motion = between_fixed_values(slowest)
     audited = audit(slowest, motion, to_show=True)
     seconds = time.perf_counter() - start
-    near = partial(_offered, near_chosen_motion, search, slowest, motion, audited)
-    offers = partial(_offered, stronger_or_nearer, search, slowest, audited) if proof.by_weight else near
+    offers = partial(feasible_changes, search, slowest, motion, audited)
     return Plan(slowest, MotionStatus.INFEASIBLE, motion, proof.of(audited), 0.0, seconds, offers=offers)
 
 
@@ -168,7 +147,7 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
     audit = search.audit_motion(slowest, None, f"audit, duration {quantity(span.max, 's')}")
     if audit.passed:
         return None, True
-    offers = partial(_offered, _near_fixed, search, slowest, left, audit)
+    offers = partial(feasible_changes, search, slowest, None, audit)
     return Plan(slowest, MotionStatus.INFEASIBLE, None, audit, 0.0, 0.0, offers=offers), own
 
 
@@ -206,5 +185,5 @@ def _again(search: Search, mesh: Mesh, motion: Deviation) -> Plan | None:
 def _closest(search: Search, reason: str) -> Plan:
     """Return the best plan or a direct motion that is feasible, or else the best plan with its relaxations."""
     plan = search.best(reason)
-    offers = partial(_offered, near_chosen_motion, search, plan.scenario, plan.deviation, plan.audit)
+    offers = partial(feasible_changes, search, plan.scenario, plan.deviation, plan.audit)
     return plan if plan.feasible else search.audit_direct() or replace(plan, offers=offers)

@@ -1,6 +1,7 @@
 """What a report offers in place of an infeasible task is feasible when it is planned, and little less is not."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,9 +9,9 @@ import pytest
 from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, plan
 from towline.ocp.limits import Limit
-from towline.ocp.search import relaxations
+from towline.ocp.search import feasible_changes, other_plans, slower
+from towline.ocp.search.looser_limits import looser_limits
 from towline.ocp.search.search import Search
-from towline.ocp.search.stronger_or_nearer import near_chosen_motion
 from towline.ocp.tasks import scenario, task_checks
 from towline.ocp.tasks.ends import between_fixed_values
 from towline.ocp.tasks.lay_out import lay_out
@@ -19,6 +20,7 @@ from towline.ocp.tasks.task import read_task
 ROBOT = load("ipanema-1")
 LINE = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}
 TASK = {"path": LINE, "duration": 2}
+BELOW = {"min": [-1, -1, 0], "max": [1, 1, 0.5]}  # both ends of paths
 BALL = {"kind": "sphere", "name": "post", "centre": [0.25, 0.15, 2.0], "radius": 0.2}
 
 
@@ -117,7 +119,7 @@ def test_a_motion_in_a_tube_is_offered_what_it_needs(limits, offered):
 def test_no_longer_duration_is_tried_where_an_end_is_in_the_way(monkeypatch):
     """Spare a program or two for nothing: whether an end is inside a ball does not depend on time."""
     durations = []
-    monkeypatch.setattr(relaxations, "_longer_duration", lambda *given: durations.append(given) or [])
+    monkeypatch.setattr(slower, "_lasting", lambda *given: durations.append(given))
     for limits in ({"keep_out": [{**BALL, "centre": [0.5, 0.3, 1.2], "cables": None}]}, {"platform_speed": 0.2}):
         task = TASK | {"tube": {"position": 0.02}, "steps": 20, "limits": limits}
         _ = plan(ROBOT, task).relaxations
@@ -282,18 +284,19 @@ def test_an_enclosed_end_has_a_way_without_the_wall_that_closes_it(monkeypatch):
     through = between_fixed_values(laid_out)
 
     search = Search(laid_out, {}, None)
-    (offer,) = near_chosen_motion(search, laid_out, through, search.audit_motion(laid_out, through))
+    (offer,) = feasible_changes.feasible_changes(
+        search, laid_out, through, search.audit_motion(laid_out, through)
+    ).found
     assert offer.name == "number of keep-out regions"
     kept = [wall for wall in walls if repr(wall["name"]) not in offer.detail]
     assert offer.possible == len(kept) < len(walls)
     assert plan(robot, task | {"limits": {"keep_out": kept}}).feasible
-    monkeypatch.setattr(relaxations, "MOST_EFFORT", 0.0)
-    team = load("multi-quadrotor-3")
-    task = {"path": {"kind": "line", "start": [0, 0, 0], "end": [1, 0, 0]}, "duration": 0.1, "steps": 10}
-    none = plan(team, task | {"base": {"kind": "free", "ends": "rest"}})
-    assert not none.relaxations
+    monkeypatch.setattr(other_plans, "MOST_EFFORT", 0.0)
+    none = feasible_changes.feasible_changes(search, laid_out, through, search.audit_motion(laid_out, through))
+    assert not none.found
     assert none.cut_short
-    assert "the search for changes was cut short" in none.report()
+    refused = replace(plan(robot, task | {"limits": {"platform_box": BELOW}}), offers=lambda: none)
+    assert "the search for changes was cut short" in refused.report()
 
 
 def test_robots_that_cannot_be_so_far_apart_have_a_distance_at_which_they_hold_the_platform():
@@ -303,7 +306,7 @@ def test_robots_that_cannot_be_so_far_apart_have_a_distance_at_which_they_hold_t
     robot = load("wang-ctmrts")
     laid_out = lay_out(robot, read_task(task | {"limits": {"carrier_separation": 8.4}}))
     search = Search(laid_out, {}, None)
-    (offer,) = relaxations.near_motion(search, laid_out, None, search.audit_motion(laid_out, None), (1.0, 1.0))
+    (offer,) = looser_limits(search, laid_out, None, search.audit_motion(laid_out, None))
     assert offer.name == "limits.carrier_separation"
     corners = np.array([[carrier.reach.min, carrier.reach.max] for carrier in robot.carriers])
     assert np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)) < 8

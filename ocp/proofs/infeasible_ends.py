@@ -28,7 +28,7 @@ from .no_attitude import CERTAIN, no_attitude
 from .no_cycle import no_cycle
 from .out_of_reach import out_of_reach
 from .too_fast import too_fast
-from .too_heavy import OF_WEIGHT, too_heavy
+from .too_heavy import too_heavy
 from .too_weak_carriers import OF_DURATION, too_weak_carriers
 
 PLACES = 41  # along the path
@@ -48,11 +48,6 @@ class InfeasibleEnds(NamedTuple):
         if self.certificate is not None:
             lines.append(f"no tensions at t = {self.certificate.time:.3f} s")
         return "; ".join(lines)
-
-    @property
-    def by_weight(self) -> bool:
-        """Return whether the robot is too weak for what it carries, which no other field of the task changes."""
-        return any(excess.limit in OF_WEIGHT for excess in self.excess)
 
     def of(self, audit: Audit) -> Audit:
         """Return an audit that shows what is proven, and no more."""

@@ -16,9 +16,9 @@ from ..result import Relaxed
 from ..tasks.ends import fixed_values
 from ..tasks.lay_out import with_task
 from ..tasks.paths import AnyPath
-from ..tasks.scenario import ATTITUDE, Scenario
+from ..tasks.scenario import Scenario
 from ..tasks.wind_set import possible_winds_at
-from .relaxations import ORDERS, at_ease, planned, rounded
+from .other_plans import planned, rounded
 from .search import Search
 
 INSTANTS = 120  # at which tensions must exist before a motion is audited
@@ -26,6 +26,8 @@ HALVINGS, OF_PROOFS = 10, 6  # the latter where a program decides what is offere
 RESERVES = 1.0, 0.98, 0.9  # of the largest share with tensions at these instants, tried in order until an audit passes
 OF_PROGRAMS = 0.5, 0.9  # of it, if programs decide: in order until one has no solution
 LEAST = 0.1  # of it, if the first one has none
+ORDERS = {"/s": 1, "W": 1, "/s^2": 2, "/s^3": 3}  # of the rates with such units, which fall with 1/T to that power
+EASE, PLACES = 0.1, 61  # of the acceleration of gravity, along the path, and places of it
 HURRIED = 2.0  # times shorter than with small accelerations: flying carriers hardly move a load any faster
 EASIEST = 1e-3  # the share at which changes together are as easy as can be
 
@@ -57,14 +59,11 @@ Maker: TypeAlias = Callable[[Scenario], Change | None]
 """A function that returns a change of a scenario, or None if it has nothing to change."""
 
 
-def largest_share(search: Search, change: Change | None, most: float = 1.0, rates: bool = False) -> list[Relaxed]:
-    """Return the variation with the largest share, from 0 to `most`, that passes its audit; [] if none is found.
-
-    With `rates` the share decides about speeds and accelerations too, as that of a duration does.
-    """
+def largest_share(search: Search, change: Change | None) -> list[Relaxed]:
+    """Return the variation with the largest share that passes its audit; [] if none is found."""
     if change is None:
         return []
-    largest = _largest(lambda share: change.at(share)[0], 0.0, most, rates)
+    largest = _largest(lambda share: change.at(share)[0])
     name = f"audit, other {change.name}"
     found = _planned(search, lambda part: change.at(part * largest)[0], name) if largest else None
     return [] if found is None else [change.offer(found[0] * largest, found[1])]
@@ -80,7 +79,7 @@ def together(search: Search, scenario: Scenario, makers: Sequence[Maker]) -> lis
 
     def easy(makers: Sequence[Maker]) -> bool:
         easiest = _legal(lambda share: _changed(scenario, makers, np.full(len(makers), share))[1], EASIEST)
-        return easiest is not None and _may_be_feasible(easiest, rates=True)
+        return easiest is not None and _may_be_feasible(easiest)
 
     kept = every = [make for make in makers if make(scenario) is not None]
     if not easy(every):
@@ -128,12 +127,13 @@ def _changed(scenario: Scenario, makers: Sequence[Maker], shares: np.ndarray) ->
     return changes, scenario
 
 
-def _largest(at: Callable[[float], Scenario], low: float = 0.0, high: float = 1.0, rates: bool = True) -> float:
-    """Return the largest share between two whose scenario may be feasible; the lowest if none is known to be."""
+def _largest(at: Callable[[float], Scenario], low: float = 0.0) -> float:
+    """Return the largest share from a low one on whose scenario may be feasible; the low one if none is known."""
+    high = 1.0
     for _ in range(OF_PROOFS if (most := _legal(at, 1.0)) and by_programs(most) else HALVINGS):
         middle = (low + high) / 2
         varied = _legal(at, middle)
-        low, high = (middle, high) if varied and _may_be_feasible(varied, rates) else (low, middle)
+        low, high = (middle, high) if varied and _may_be_feasible(varied) else (low, middle)
     return low
 
 
@@ -161,18 +161,9 @@ def by_programs(scenario: Scenario) -> bool:
 
     Carriers are free, given states are off the path, or few cables let the platform tilt.
     """
-    return _off_path(scenario) or _tilts(scenario)
-
-
-def _off_path(scenario: Scenario) -> bool:
-    """Return whether no motion is exactly that of the references."""
     away = scenario.count > 0 and any(fixed.value for fixed in fixed_values(scenario))
-    return bool(scenario.carrier_free) or away
-
-
-def _tilts(scenario: Scenario) -> bool:
-    """Return whether the tube frees the attitude of a platform with fewer cables than degrees of freedom."""
-    return scenario.robot.m < scenario.robot.dof_mask.sum() and bool(scenario.task.tube.turn)
+    tilts = scenario.robot.m < scenario.robot.dof_mask.sum() and bool(scenario.task.tube.turn)
+    return bool(scenario.carrier_free) or away or tilts
 
 
 def _legal(at: Callable[[float], Scenario], share: float) -> Scenario | None:
@@ -183,23 +174,20 @@ def _legal(at: Callable[[float], Scenario], share: float) -> Scenario | None:
         return None
 
 
-def _may_be_feasible(scenario: Scenario, rates: bool) -> bool:
+def _may_be_feasible(scenario: Scenario) -> bool:
     """Return whether limits and tensions permit some instants of a fixed motion, tensions only off the ground.
 
-    Of a motion that leaves the path, return whether nothing proves that there is none. If the platform tilts, tensions
-    need only exert the force.
+    If only a program shows whether there is a motion, return whether nothing proves that there is none.
     """
-    if _off_path(scenario):
+    if by_programs(scenario):
         hurried = bool(scenario.carrier_free) and at_ease(scenario) > HURRIED * scenario.duration
         return not hurried and rests(scenario) and infeasible_ends(scenario) is None
     times = np.linspace(0.0, scenario.duration, INSTANTS)
-    if exceeds(scenario, times, rates).any():
+    if exceeds(scenario, times).any():
         return False
     times = times[~scenario.phases.resting(times)]
     platform, carriers = scenario.motion(times, None)
-    mask = scenario.robot.dof_mask.copy()
-    if _tilts(scenario):
-        mask[list(ATTITUDE)] = 0
+    mask = scenario.robot.dof_mask
     A = scenario.dynamics.wrench_matrix(platform.pose, carriers.pose) * mask[:, None]
     low, high = scenario.bounds_at(times)
     winds = [scenario.wind]
@@ -212,13 +200,21 @@ def _may_be_feasible(scenario: Scenario, rates: bool) -> bool:
     return True
 
 
+def at_ease(scenario: Scenario) -> float:
+    """Return the duration in which the platform's acceleration on its path is at most `EASE` of gravity's [s]."""
+    times = np.linspace(0.0, scenario.duration, PLACES)
+    fastest = np.linalg.norm(scenario.motion(times, None)[0].acceleration[:, :3], axis=1).max()
+    of_weight = scenario.robot.force_scale / scenario.robot.platform.mass
+    return float(scenario.duration * np.sqrt(fastest / (EASE * of_weight)))
+
+
 def rests(scenario: Scenario) -> bool:
     """Return whether tensions hold the platform at rest at both ends, with carriers where they are at first."""
     space = Space(scenario)
     return bool((AtRest(scenario, space.size)(*space.poses(space.ends)).worst >= 0).all())
 
 
-def exceeds(scenario: Scenario, times: np.ndarray, rates: bool) -> np.ndarray:
+def exceeds(scenario: Scenario, times: np.ndarray, rates: bool = True) -> np.ndarray:
     """Return at which of `times` (n,) a fixed motion exceeds a hard limit that does not depend on tensions.
 
     Without `rates`, speeds and accelerations are left out.

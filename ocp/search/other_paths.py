@@ -1,4 +1,4 @@
-"""What path near a task's own is feasible: a nearer end, a smaller or shifted path, other yaws."""
+"""What path near a task's own is feasible: a nearer end, a smaller or shifted path, other yaws, a wider tube."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -7,19 +7,26 @@ import numpy as np
 
 from ...base.text import quantity, quantity_row
 from ...solvers.margins import margins
+from ..audits.audit import Audit
 from ..audits.tensions import scaled
 from ..global_path.at_rest import AtRest
 from ..global_path.shortest_shifts import shortest_shifts
+from ..result import Relaxed
+from ..tasks.lay_out import with_task
 from ..tasks.paths import CirclePath, FeedPath, LinePath, WaypointPath
 from ..tasks.paths.base import PathBase
-from ..tasks.scenario import Scenario
+from ..tasks.scenario import ATTITUDE, Scenario
 from .largest_share import RESERVES, Change, Variation, along
-from .relaxations import rounded
+from .other_plans import planned, rounded, solved
+from .search import Search
 
 LEAST = 0.05  # of a path: with less, other changes are better advice
 MOST_NAMED = 5  # points of a smaller path that its advice gives
 PLACES = 31  # of a path, at which a shifted one is compared
 YAWS = np.deg2rad(np.arange(-180, 180, 5))  # that are tried
+WIDER = 0.05  # of the distance of a given state from its path, at which almost nothing is left to choose
+MOST_TILTED = 0.5  # [rad], of a tilt that is offered
+SPARE = 1.01  # times the largest tilt at the nodes
 POINT, POINTS, PATHS = ("start", "end", "pose", "centre"), ("points", "poses"), ("path", "along")
 AnyKind = TypeVar("AnyKind", bound=PathBase)
 
@@ -148,6 +155,43 @@ def other_yaws(scenario: Scenario) -> Change | None:
         return along(scenario, path_with_yaws), float(yaws[0]), detail
 
     return Change(f"yaw at {names[wrong[0]]}", "rad", with_yaws, up=bool(back[0] > 0), requested=float(given[0]))
+
+
+def as_wide_as_states(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
+    """Return the radius of the tube that reaches the given state farthest outside it."""
+    tube = scenario.task.tube
+    off = max((excess.value for excess in audit.excess if excess.limit == "tube.position"), default=0.0)
+    if off <= tube.radius:
+        return []
+    radius = rounded((1 + WIDER) * off, up=True)
+    plan = planned(search, _with_tube(scenario, position=radius), "audit, wider tube")
+    return [] if plan is None else [Relaxed("tube.position", "m", tube.radius, radius, plan)]
+
+
+def tilting_platform(search: Search, scenario: Scenario) -> list[Relaxed]:
+    """Return the tube in which the platform must be allowed to tilt, so that few cables can hold it on its path.
+
+    Cables fewer than the degrees of freedom balance the weight in few attitudes, which change from place to place.
+    """
+    task, robot = scenario.task, scenario.robot
+    angles = [axis for axis in ATTITUDE if robot.dof_mask[axis]]
+    if task.tube.turn or task.phases is not None or not angles or robot.m >= robot.dof_mask.sum():
+        return []
+    free = _with_tube(scenario, attitude=MOST_TILTED)
+    outcome = solved(search, free, None)
+    if outcome is None:
+        return []
+    turns = [column for column, (owner, axis) in enumerate(free.owners()) if owner is None and axis in angles]
+    tilt = min(rounded(SPARE * float(np.abs(outcome.deviation.q[:, turns]).max()), up=True), MOST_TILTED)
+    if not tilt:
+        return []
+    tilting = _with_tube(scenario, attitude=tilt)
+    plan = planned(search, tilting, "audit, tilting platform", outcome.deviation)
+    return [] if plan is None else [Relaxed("tube.attitude", "rad", task.tube.turn, tilt, plan, "about each axis")]
+
+
+def _with_tube(scenario: Scenario, **changes: float) -> Scenario:
+    return with_task(scenario, tube=scenario.task.tube.model_copy(update=changes))
 
 
 def _margins_at_yaws(scenario: Scenario, points: np.ndarray, yaws: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What leads past keep-out regions: `past_regions`, other ends of a line and waypoints round what is in the way."""
+"""What leads past keep-out regions: other ends of a line, waypoints round what is in the way, or fewer regions."""
 
 from collections.abc import Iterator
 from itertools import chain
@@ -8,6 +8,7 @@ import numpy as np
 
 from ...base.text import quantity, quantity_row
 from ...models.part import Box
+from ..audits.audit import Audit
 from ..global_path.at_rest import AtRest
 from ..global_path.global_path import find_global_path
 from ..global_path.shortest_shifts import shortest_shifts
@@ -20,9 +21,10 @@ from ..tasks.lay_out import with_task
 from ..tasks.paths import FeedPath, LinePath, WaypointPath
 from ..tasks.scenario import POSITION, Scenario
 from ..tasks.task_limits import OF_BODY
-from .largest_share import along, by_programs, exceeds
-from .relaxations import other_duration, planned, rounded
+from .largest_share import Change, Variation, along, by_programs, exceeds
+from .other_plans import planned, rounded
 from .search import Search
+from .slower import other_duration
 
 IN_THE_WAY = {"keep_out", "cable_clearance", *OF_BODY}  # limits
 STEPS = 100  # at least, in the robot's size: positions are offered in round steps
@@ -227,3 +229,21 @@ def _slack(kept: AtRest, pose: np.ndarray, carriers: np.ndarray, moved: np.ndarr
 def _floor(scenario: Scenario) -> float:
     """Return the height of the floor [m]: z = 0 where no anchor is lower, else there is none."""
     return 0.0 if scenario.robot.home_anchors[:, 2].min() >= 0 else -np.inf
+
+
+def fewer_regions(scenario: Scenario, audit: Audit | None) -> Change | None:
+    """Return the change to the regions that the audited motion keeps clear of, or without an audit to no regions."""
+    limits, given = scenario.task.limits, scenario.task.limits.keep_out
+    excesses = () if audit is None else audit.excess
+    through = {excess.about.partition(" outside ")[2] for excess in excesses if excess.limit == "keep_out"}
+    kept = () if audit is None else tuple(region for region in given if region.name not in through)
+    through = through or {region.name for region in given}
+    if len(kept) == len(given):
+        return None
+
+    def without(share: float) -> Variation:
+        left = given if share == 1.0 else kept
+        varied = with_task(scenario, limits=limits.model_copy(update={"keep_out": left}))
+        return varied, len(left), f"of {len(given)}, without {', '.join(map(repr, sorted(through)))}"
+
+    return Change("number of keep-out regions", "", without)

@@ -1,20 +1,119 @@
 """Changes to a slower motion: longer durations, of the whole or of phases, a smaller feed, slower given states."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...base.text import quantity
+from ...models.part import PositiveRange
 from ..audits.audit import Audit
+from ..audits.excess import Excess
+from ..plan import Plan
+from ..proofs.durations import Durations
+from ..proofs.infeasible_ends import infeasible_ends
 from ..result import Relaxed
 from ..tasks.lay_out import with_task
 from ..tasks.paths import CirclePath, FeedPath, RestPath, SequencePath
 from ..tasks.scenario import Scenario
-from .largest_share import Change, Variation, along, largest_share
-from .relaxations import LONGEST, at_ease, planned, rounded
+from ..tasks.status import MotionStatus
+from .largest_share import ORDERS, Change, Variation, along, at_ease, largest_share
+from .other_plans import planned, rounded, solved
 from .search import Search
 
+LONGER = 1.002  # than the shortest duration: between the places that were checked slightly more can be needed
+LONGEST = 100.0  # times the duration that is requested, or else needed by tensions: a longer one does not help
+TRIES = 3  # of a duration: not all that is exceeded falls as speeds and accelerations do
+TIME_COUNTS = 1e-4  # of a feasible duration: it adds one to the objective, so that other costs hardly matter
+LONGEST_CHOSEN = 20.0  # times the shortest duration
+SHORTER = "(shorter ones may be feasible)"
+LONGER_CHOSEN = 1.1  # than the shortest duration, at which almost nothing is left to choose
+NEAR = 1.05  # times the longest duration that is proven to be too short
 AT_EASE = 10.0  # times the duration with small accelerations: speeds are small too
 HALVINGS = 5  # of given speeds: each solves a program
 STATES = "initial", "final"
+
+
+def other_duration(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
+    """Return the nearest duration at which a scenario's motion exactly on its path is possible, if one is known.
+
+    Speeds fall with the duration, accelerations with its square; `left` are the durations that the tensions allow, and
+    `audit` is that of this motion.
+    """
+    if not scenario.stretches or (left is not None and not left.exist):
+        return []
+    missing = audit.violation.max() > audit.tolerance
+    if left is None and missing:
+        return []
+    requested = near = lasts = scenario.duration
+    if left is not None:
+        near = min(max(near, LONGER * left.shortest), left.longest / LONGER)
+    for _ in range(TRIES):
+        factor = max((slower(excess) for excess in audit.excess), default=1.0)
+        near = max(near, LONGER * factor * lasts) if factor > 1 else near
+        if near == lasts:  # no duration changes what is exceeded, and this one is audited
+            return []
+        lasts = near = rounded(near, up=near >= requested)
+        shortest = requested if left is None else max(requested, left.shortest)
+        if (left is not None and not left.shortest <= near <= left.longest) or near > min(
+            LONGEST * shortest, scenario.longest
+        ):
+            return []
+        longer = replace(scenario, task=scenario.task.model_copy(update={"duration": near}), duration=near)
+        audit = search.audit_motion(longer, None, f"audit, duration {quantity(near, 's')}")
+        if audit.passed:
+            plan = Plan(longer, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0)
+            return [Relaxed("duration", "s", requested, near, plan)]
+        if audit.violation.max() > audit.tolerance:
+            return []
+    return []
+
+
+def slower(excess: Excess) -> float:
+    """Return the factor of the duration that brings a power, speed or its derivative to its bound, or 1 for others."""
+    if not excess.bound or not excess.value / excess.bound > 1:
+        return 1.0
+    order = next((order for end, order in ORDERS.items() if excess.unit.endswith(end)), np.inf)
+    return (excess.value / excess.bound) ** (1 / order)
+
+
+def longer_duration(search: Search, audit: Audit) -> list[Relaxed]:
+    """Return a longer duration at which the planner finds a motion, if one is found; `audit` is of the closest motion.
+
+    Durations between nearly the longest that is proven to be too short, or what is requested, and `LONGEST_CHOSEN`
+    times as much are possible. A motion at ease is found most easily; from there the program with a free duration
+    looks for a shorter one.
+    """
+    scenario, task = search.scenario, search.scenario.task
+    if not scenario.stretches or infeasible_ends(scenario.lasting(scenario.longest)) is not None:
+        return []
+    requested = scenario.duration_range.max if scenario.duration_range is not None else scenario.duration
+    shortest, possible = requested, scenario.longest
+    if infeasible_ends(scenario.lasting(shortest)) is not None:
+        while possible > NEAR * shortest:
+            middle = float(np.sqrt(shortest * possible))
+            proven = infeasible_ends(scenario.lasting(middle)) is not None
+            shortest, possible = (middle, possible) if proven else (shortest, middle)
+    longest = min(LONGEST_CHOSEN * shortest, scenario.longest)
+    if LONGER_CHOSEN * shortest > longest:
+        return []
+    ease = at_ease(scenario)
+    slowest = max(ease, 2 * shortest, *(slower(excess) * requested for excess in audit.excess))
+    plan = _lasting(search, min(slowest, max(ease, longest), scenario.longest))
+    if plan is None:
+        return []
+    objective = task.objective.model_copy(update={"time": TIME_COUNTS * plan.duration})
+    open_ended = with_task(scenario, duration=PositiveRange(min=shortest, max=plan.duration), objective=objective)
+    outcome = solved(search, open_ended, plan.deviation)
+    # Without a guess, as when it is planned anew.
+    near = None if outcome is None else _lasting(search, LONGER_CHOSEN * max(outcome.duration, requested))
+    found = near or plan
+    return [Relaxed("duration", "s", requested, found.duration, found, "" if near else SHORTER)]
+
+
+def _lasting(search: Search, seconds: float) -> Plan | None:
+    """Return the plan of the search's task with another duration."""
+    longer = with_task(search.scenario, duration=rounded(seconds, up=True))
+    return planned(search, longer, "audit, longer duration")
 
 
 def longer_phases(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
@@ -25,7 +124,7 @@ def longer_phases(search: Search, scenario: Scenario, audit: Audit) -> list[Rela
     times = [excess.time for excess in audit.excess if excess.time is not None]
     times += audit.times[audit.violation > audit.tolerance].tolist()
     change = longer(scenario, np.array(times)) if scenario.task.phases else None
-    return largest_share(search, change, rates=True)
+    return largest_share(search, change)
 
 
 def longer(scenario: Scenario, times: np.ndarray | None = None) -> Change | None:

@@ -26,7 +26,7 @@ from ..tasks.lay_out import with_task
 from ..tasks.paths import TimedPath
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
-from .relaxations import planned, rounded
+from .other_plans import planned, rounded
 from .search import Search
 
 LEAST_PERIOD, INSTANTS = 0.02, 200  # [s], from the beginning of one stop to that of the next; and how many at most

@@ -11,9 +11,9 @@ from towline.ocp.planner import Planner
 from towline.ocp.reports.report import sections
 from towline.ocp.result import Offers
 from towline.ocp.search.largest_share import _largest, largest_share
+from towline.ocp.search.other_forces import smaller_t_min
 from towline.ocp.search.other_paths import other_yaws, shifted
 from towline.ocp.search.search import Search
-from towline.ocp.search.stronger_or_nearer import _smaller_t_min
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
 
@@ -576,7 +576,7 @@ def test_the_share_of_t_min_at_which_a_team_rests_is_that_of_its_only_tensions()
         cable["t_min"] = 20.0
     robot = Robot.model_validate(data)
     task = {"path": {"kind": "line", "start": [0, 0, 0], "end": [0.1, 0, 0]}, "duration": 3}
-    change = _smaller_t_min(lay_out(robot, read_task(task | {"base": {"kind": "free", "ends": "rest"}})))
+    change = smaller_t_min(lay_out(robot, read_task(task | {"base": {"kind": "free", "ends": "rest"}})))
     share = _largest(lambda share: change.at(share)[0])
     own = tensions(load("multi-quadrotor-3"), robot.home).tensions.min()
     missed = 0.1 * robot.weight  # is what rest may miss of the force of few cables, which a program finds
@@ -601,7 +601,7 @@ def test_a_region_between_points_has_further_points_and_one_about_a_point_has_an
         assert max(kept) < 0.02  # of a span of 1.2 m 1 % is rounded off at most
 
 
-def test_a_path_below_the_floor_with_cables_that_pull_too_hard_is_shifted_and_has_a_smaller_t_min():
+def test_a_path_below_the_floor_with_cables_that_pull_too_hard_is_shifted_and_has_asmaller_t_min():
     robot = without_attitude(t_min=600).model_copy(update={"floor": 1.05})
     task = {"path": {"kind": "line", "start": [-0.3, 0, 1], "end": [0.3, 0.2, 1.2]}, "duration": 5}
     found = plan(robot, task)
