@@ -214,7 +214,7 @@ def test_a_motion_that_no_wind_of_the_disc_rules_out_is_offered_others(monkeypat
     found = plan(hanging(1.0), {"path": line, "duration": 0.8, "wind": {"speed": 4.06}})
     assert found.status is MotionStatus.NOT_FOUND
     assert found.certificate is None
-    assert "that enclose those of the disc" in told(found).splitlines()[0]
+    assert "winds a little stronger than the task's" in told(found).splitlines()[0]
     assert "wind" in {each.name for each in found.relaxations}
     assert all(each.plan.feasible for each in found.relaxations)
 
