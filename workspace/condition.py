@@ -126,7 +126,7 @@ class TensionCondition(Condition, ABC):
     """A condition about tension limits, which can be required for uncertain robots."""
 
     robust: Share | None = optional(
-        "fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, for which the "
+        "fraction of all robots within the `uncertainty` of the robot file, such as 0.95, for which the "
         "condition must hold, to first order, at all accepted configurations simultaneously; default: the "
         "nominal robot only"
     )

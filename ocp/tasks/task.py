@@ -189,7 +189,7 @@ class Task(Part):
     )
     wind: Vector3 | WindBox | WindDisc | None = optional(
         "wind on the platform in {G} [m/s]: one velocity; a range {min, max}; or {speed}, every horizontal wind up to "
-        "a speed. In a range, tensions exist for every wind, and the planned tensions are those for the middle of the "
+        "a speed. In a range, tensions exist for every wind, and the planned tensions are for the middle of the "
         "range (for {speed}: still air). [0, 0, 0] is still air, with drag on a moving platform; default: no "
         "aerodynamic forces"
     )

@@ -21,7 +21,7 @@ class LinePath(PathBase):
     timing: Literal["smooth", "smoother", "uniform"] | None = optional(
         "smooth: from rest to rest, acceleration and jerk zero there; smoother: the next two derivatives "
         "zero too; uniform: constant speed; default: smoother if quadrotors could otherwise not rest at the ends "
-        "(an exact path of a platform under fewer than six cables), else smooth"
+        "(an exact path of a platform on fewer than six cables), else smooth"
     )
 
     @override

@@ -74,7 +74,7 @@ class WaypointPath(PathBase):
 
     timing: Literal["smoother"] | None = optional(
         "for legs: smoother: the first five derivatives of each leg are zero at its ends; default: smoother if "
-        "quadrotors could otherwise not follow (an exact path of a platform under fewer than six cables)"
+        "quadrotors could otherwise not follow (an exact path of a platform on fewer than six cables)"
     )
 
     @model_validator(mode="before")
