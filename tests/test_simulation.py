@@ -15,7 +15,7 @@ from towline.models import Dynamics, Robot
 from towline.ocp import Task
 from towline.plant import Plant, layout
 from towline.plant.steps import steps_in
-from towline.simulation import simulate
+from towline.simulation import Wall, simulate
 from towline.simulation.flights import report
 
 
@@ -373,7 +373,7 @@ def test_periods_that_do_not_divide_the_duration_reach_the_end_of_the_plan(crane
         ({"period": 0}, "period"),
         ({"period": 5}, "period must be at most the simulated time of 3 s, got 5 s"),
         (
-            {"events": [{"kind": "wall", "at": 0, "point": [9, 0, 0], "normal": [-1, 0, 0], "stiffness": 1, "damping": 1e9}]},
+            {"events": [Wall(at=0, point=(9, 0, 0), normal=(-1, 0, 0), stiffness=1, damping=1e9)]},
             "events[0] must change so slowly that it may be held for 1e-06 s, 1/1000 of the period, got",
         ),
         ({"runs": 0}, "runs"),
