@@ -76,7 +76,7 @@ def _newton(
 ) -> tuple[Equilibrium, np.ndarray]:
     """Return the equilibria that Newton's method reaches, and which of them are stable, (N,)."""
     dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
-    n, m, unit, com = len(rows), robot.m, _unit(robot), np.array(robot.platform.com)
+    n, unit, com = len(rows), _unit(robot), np.array(robot.platform.com)
     weight = (robot.platform.mass * np.array([*robot.gravity, 0.0, 0.0, 0.0]) * robot.wrench_scale)[rows] / unit
     pose = starts.copy()
     A = (dynamics.wrench_matrix(pose, carriers) * robot.wrench_scale[:, None])[:, rows]
