@@ -59,14 +59,14 @@ def test_the_zoo_is_told_apart_or_declined_as_documented(method):
 def test_every_feasible_problem_is_solved_by_methods_that_say_so(method):
     rng = np.random.default_rng(31)
     counts = {"optimal": 0, "failed": 0}
-    for k in range(80):
+    for k in range(40):
         problem = random_feasible(rng, 3 + k % 8)
         counts[solve(problem, method).status] += 1
     if method in ALWAYS_FIND or method == "dykstra":
         assert counts["failed"] == 0
     else:
-        assert counts["optimal"] >= (60 if method == "improved-closed-form" else 30)
-    for k in range(40):
+        assert counts["optimal"] >= (30 if method == "improved-closed-form" else 15)
+    for k in range(16):
         problem = random_infeasible(rng, 3 + k % 8)
         solution = solve(problem, method)
         assert not solution.feasible
@@ -260,7 +260,7 @@ def test_the_centroid_of_shapes_that_everybody_knows():
 
 def test_the_centroid_of_a_polygon_is_the_mean_of_its_points():
     rng = np.random.default_rng(39)
-    for _ in range(5):
+    for _ in range(2):
         problem = inner_problem(rng, 8)
         null = np.linalg.svd(problem.A)[2][6:]
         particular = np.linalg.lstsq(problem.A, problem.w, rcond=None)[0]
