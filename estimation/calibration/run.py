@@ -36,15 +36,11 @@ def calibrate(
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file, with the initial values.
         measurements: `Measurements` of the robot, or from `read_measurements`.
-        free: Parameters to estimate, any of anchors, attachments, offsets (of the lengths), scales (of the lengths),
-            radii (of the pulleys), build-up (of cable on the drums), clock (time by which the clock of the poses is
-            ahead of the clock of the lengths), frame and body (errors of the frame that poses were measured in, and of
-            the platform frame in the measured body), com (CoM of the platform), elasticity (one stiffness for all
-            cables; also estimated if the log shows it), and with tensions mass, stiffness,
-            capstan (friction as the logarithm of a ratio of tensions), friction (as a force), gains (newtons per unit
-            of the tensions, if these are motor currents) and zeros (of load cells; also estimated if the log shows
-            some). Default: anchors and offsets, and the clock if times and poses of a motion were measured. Or "auto":
-            the smallest set whose cross-validation error is close to the smallest one; this set may be empty.
+        free: Parameters to estimate (docs/howto/calibrate.md explains them): any of anchors, attachments, offsets, scales,
+            radii, build-up, clock, frame, body, com and elasticity, and with tensions also mass, stiffness, capstan,
+            friction, gains and zeros. Default: anchors and offsets, and the clock if times and poses of a motion were
+            measured. Or "auto": the smallest set whose cross-validation error is close to the smallest one; this set
+            may be empty.
         prior: Standard deviations of the file's values, in the units of the parameters, by the names of `free`, such as
             {"anchors": 0.02}. Default: no prior; unobservable directions change as little as possible.
         outliers: True to detect outliers, which are left out, and slipped winches, whose cable gets a new offset after
