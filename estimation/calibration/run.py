@@ -36,7 +36,7 @@ def calibrate(
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file, with the initial values.
         measurements: `Measurements` of the robot, or from `read_measurements`.
-        free: Parameters to estimate (docs/howto/calibrate.md explains them): any of anchors, attachments, offsets, scales,
+        free: Parameters to estimate (see docs/howto/calibrate.md): any of anchors, attachments, offsets, scales,
             radii, build-up, clock, frame, body, com and elasticity, and with tensions also mass, stiffness, capstan,
             friction, gains and zeros. Default: anchors and offsets, and the clock if times and poses of a motion were
             measured. Or "auto": the smallest set whose cross-validation error is close to the smallest one; this set
