@@ -43,7 +43,7 @@ class Noise(Part):
 
     @property
     def of_tensions(self) -> float:
-        """Return the standard deviation of tensions [N], that of their resolution included."""
+        """Return the standard deviation of tensions [N], including their resolution."""
         return float(np.hypot(self.tension, self.tension_resolution / np.sqrt(12)))
 
     @property

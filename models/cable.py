@@ -35,7 +35,7 @@ class Winch(Part):
 
     @property
     def tension_max(self) -> float:
-        """Return the largest tension [N] with which it can begin to haul in: what friction leaves of the force."""
+        """Return the largest tension [N] with which it can begin to haul in: the motor's force minus friction."""
         return self.force_max - self.friction
 
 

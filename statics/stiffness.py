@@ -76,14 +76,14 @@ def stiffest(
 ) -> StiffestTensions:
     """Compute the tensions inside their limits that give w and maximise the lowest natural frequency.
 
-    The frequency is that of small motions with fixed unstrained lengths, see `natural_frequencies`.
+    The frequency is for small motions with fixed unstrained lengths, see `natural_frequencies`.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file. Every cable has a `stiffness` and
             a `t_min` above zero: without tension a cable has no stiffness, so that the frequency would jump.
         pose: (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (6,).
         carrier_pose: The same of each carrier, (c, 6); default: at home.
-        w: Required wrench about the CoM in {G} [N, N m], (6,); default: that of the platform at rest.
+        w: Required wrench about the CoM in {G} [N, N m], (6,); default: for the platform at rest.
 
     Raises:
         InputError: If an argument has a wrong shape or value, or a cable has no stiffness or no t_min above zero.

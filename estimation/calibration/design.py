@@ -41,7 +41,7 @@ def next_poses(
         candidates: Poses to choose from, (k, 6) [m, rad]. Default: random ones with angles up to 0.3 rad at which
             tensions inside their limits hold the platform at rest.
         count: Number of poses.
-        free: Parameters to estimate, as in `calibrate`; default: those of a `Calibration`. A clock offset is ignored.
+        free: Parameters to estimate, as in `calibrate`; default: as in the `Calibration`. A clock offset is ignored.
         measured: True if poses will be measured, False if only lengths.
 
     Raises:

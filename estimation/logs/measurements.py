@@ -38,7 +38,7 @@ class Sigma(NamedTuple):
         rotation: Standard deviation of measured orientations, about each axis [rad]; 0: exact.
         tensions: Standard deviation of each tension, relative to it [-].
         directions: Standard deviation of cable directions, about each axis across the cable [rad].
-        clocks: Standard deviation of the carriers' clocks about that of the platform's poses [s]; 0: one clock.
+        clocks: Standard deviation of the carriers' clocks relative to the clock of the platform's poses [s]; 0: one.
     """
 
     lengths: float = SIGMA

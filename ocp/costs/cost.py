@@ -34,7 +34,7 @@ class Cost(ABC):
     """A cost: the mean over time of sum (values / amount)^2. Subclass it for a cost of your own.
 
     Args:
-        amount: Amount (default: that of the class).
+        amount: Amount (default: the class variable).
 
     Attributes:
         name: Name in messages.

@@ -94,7 +94,7 @@ class Limit(ABC):
         """Return the smallest values while all points move straight from one instant to another, (k, 1).
 
         The program limits these values where a step may jump over a region. By default there are none, and it limits
-        those at its nodes.
+        the values at its nodes.
         """
         return None
 

@@ -88,7 +88,7 @@ class GivenBase(Part):
 
 
 class FreeBase(Part):
-    """Carriers whose motion the planner chooses, inside these limits and those of the robot's file."""
+    """Carriers whose motion the planner chooses, inside these limits and the limits of the robot's file."""
 
     kind: Literal["free"]
     around: dict[Name, AnyPath] = optional(

@@ -103,7 +103,7 @@ class FastestLaw(Displayed):
 
     Attributes:
         parametrised: The robot and the geometry that was timed.
-        limits: The limits besides those of the tensions.
+        limits: The limits besides the tension limits.
         margin: Distance of every tension from its limits [N].
         s: Grid, (n,), the fraction of the path's own time, from 0 to 1.
         sd: ds/dt on the grid, (n,) [1/s]; nan without a time law.

@@ -122,7 +122,7 @@ class FeedPath(PathBase):
         return TimeLaw(s[order], speeds[order], np.pad(dwell, (0, len(s) - len(dwell)))[order])
 
     def steadiness(self) -> str:
-        """Return for how much of the time the speed is the feed, and where it is slowest between its ends."""
+        """Return the fraction of the time at the feed, and where the motion is slowest between its ends."""
         length, speed, _ = self.law.at(np.linspace(0.0, self.law.duration, LOOKS))
         share = float(np.mean(speed >= (1 - STEADY) * self._feed_at(length)))
         slower = self.law.at(self.law.time_at(self.curve.tips))[1] / self._feed_at(self.curve.tips)

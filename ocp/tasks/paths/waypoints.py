@@ -33,7 +33,7 @@ class WaypointPath(PathBase):
 
     The path stays inside the box of its points and passes them at a distance of at most `blend`. It stops at a point
     where it reverses or dwells, and at all points if `blend` is 0. Attitudes turn the shortest way: from 3.1 to -3.1
-    rad is a turn of 0.08 rad. Where path length is measured, 1 rad is taken as 1 m.
+    rad is a turn of 0.08 rad. In path lengths, 1 rad is treated as 1 m.
 
     With the shape `spline` the path is a curve of degree 5 from rest to rest that passes exactly through the points but
     may leave their box.
