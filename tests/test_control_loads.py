@@ -32,6 +32,15 @@ def test_references_of_a_plan_name_its_load(carries):
     assert of[3].load == RigidLoad.model_validate(BAG)
 
 
+def test_a_plan_without_the_load_that_the_platform_carries_is_named(carries):
+    """Nobody has set the load down: the platform still carries it, and sinks, since the reference has none."""
+    run = simulate(COGIRO, carries, events=[{"kind": "follow", "plan": COGIRO.home, "at": 4.0}], duration=4.1)
+    assert "load" not in run.conditions.doubt
+    run = simulate(COGIRO, carries, events=[{"kind": "follow", "plan": COGIRO.home, "at": 2.9}], duration=3.5)
+    assert "another plan, without the load of 150 kg that the platform carries" in run.report()
+    assert "released" not in run.report()
+
+
 @pytest.mark.parametrize("noise", [None, LATE], ids=["now", "30 ms late"])
 @pytest.mark.parametrize(
     "controller",

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_serializer, field_validator
+from pydantic import Field, PrivateAttr, ValidationInfo, field_serializer, field_validator
 from typing_extensions import override
 
 from ...base.errors import InputError
@@ -25,10 +25,11 @@ class StopReference(Event):
 
     kind: Literal["stop"] = "stop"
     short: ClassVar[str] = "stop"
+    _size: str = PrivateAttr(default="")  # duration and distance
 
     @override
     def describe(self, robot: Robot) -> str:
-        return "the reference began to stop"
+        return f"the reference began to stop{self._size}"
 
     @override
     def follow(self, robot: Robot, trajectory: Trajectory, time: float) -> Trajectory | None:
@@ -36,6 +37,7 @@ class StopReference(Event):
         if trajectory.duration is None:
             return None  # a pose
         halt = stop_along(robot, trajectory, time)
+        self._size = f" (within {quantity(halt.duration, 's')} and {quantity(halt.distance, 'm')})"
         return read_trajectory(robot, halt, None)._replace(doubt="" if halt.feasible else BEYOND)
 
 
@@ -74,20 +76,23 @@ class Follow(Event):
 
     @override
     def follow(self, robot: Robot, trajectory: Trajectory, time: float) -> Trajectory:
-        """Return the plan, with a note if its start differs from the reference at the time [s]."""
-        new = self._trajectory(robot)
+        """Return the plan, with a note if its start or its load differs from the reference at the time [s]."""
+        new, carried = self._trajectory(robot), trajectory.load_at(time)
+        notes = [new.doubt]
+        if carried is not None and not new.loads:
+            notes.append(f"another plan, without the load of {quantity(carried.mass, 'kg')} that the platform carries")
         jumps = _motions(new, 0.0) - _motions(trajectory, time)  # (2, 1 + c, 6)
         jumps[0, :, 3:] = (jumps[0, :, 3:] + np.pi) % (2 * np.pi) - np.pi
         flies = [bool(carrier.actuators) for carrier in robot.carriers]
         jumps[:, 1:, 3:][:, flies] = 0.0  # their attitudes follow from their accelerations
         most = np.abs(jumps).max(axis=(0, 2))
-        if most.max() <= JUMP:
-            return new
-        which = 0 if most[0] > JUMP else int(np.argmax(most))
-        moved, faster = np.linalg.norm(jumps[:, which, :3], axis=1).tolist()
-        whose = f"whose carrier {robot.carriers[which - 1].name!r}" if which else "which"
-        jump = f"{whose} jumps by {quantity(1e3 * moved, 'mm')} and {quantity(faster, 'm/s')} at the hand-over"
-        return new._replace(doubt="; ".join(filter(None, [new.doubt, f"another plan, {jump}"])))
+        if most.max() > JUMP:
+            which = 0 if most[0] > JUMP else int(np.argmax(most))
+            moved, faster = np.linalg.norm(jumps[:, which, :3], axis=1).tolist()
+            whose = f"whose carrier {robot.carriers[which - 1].name!r}" if which else "which"
+            jump = f"{quantity(1e3 * moved, 'mm')} and {quantity(faster, 'm/s')}"
+            notes.append(f"another plan, {whose} jumps by {jump} at the hand-over")
+        return new._replace(doubt="; ".join(filter(None, notes)))
 
 
 def _motions(trajectory: Trajectory, time: float) -> np.ndarray:
