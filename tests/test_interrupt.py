@@ -244,6 +244,7 @@ def test_an_interrupt_after_the_end_of_a_command_is_ignored(tmp_path):
 
 STOP = {signal.SIGINT: 130, signal.SIGTERM: 143}
 SWEEP = ["plan", "wang-flying", "circle.yaml", "--vary", "robot.platform.mass=0.5:3:0.01", "--workers", "2"]
+SAMPLES = ["workspace", "wang-flying", "--samples", "2e7", "--workers", "2"]
 CIRCLE = """\
 name: circle
 path: {kind: circle, centre: [0, 0, -1], radius: 0.5, rate: 3}
@@ -262,23 +263,26 @@ def processes_of(session):
     return found
 
 
-@pytest.mark.parametrize(("number", "to_all"), [(signal.SIGINT, True), (signal.SIGTERM, False), (signal.SIGTERM, True)])
-def test_a_signal_ends_a_command_and_its_workers(number, to_all, tmp_path):
+@pytest.mark.parametrize(
+    ("number", "to_all", "work"),
+    [(signal.SIGINT, True, SWEEP), (signal.SIGTERM, False, SWEEP), (signal.SIGTERM, True, SAMPLES)],
+)
+def test_a_signal_ends_a_command_and_its_workers(number, to_all, work, tmp_path):
     """A terminal, Slurm and systemd send it to the workers too, a container to the command alone."""
     (tmp_path / "circle.yaml").write_text(CIRCLE)
-    command = [TOWLINE, *SWEEP, "--checkpoint", "c"]
+    command = [TOWLINE, *work, "--checkpoint", "c"]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     process = subprocess.Popen(command, cwd=tmp_path, preexec_fn=heed_interrupts, start_new_session=True, **pipes)
     sizes = set()
-    while len(sizes) < 2:  # until the first plan is stored
+    while len(sizes) < 2:  # until the first part of the work is stored
         time.sleep(0.05)
         assert process.poll() is None, process.stderr.read()
         sizes |= {(tmp_path / "c-wal").stat().st_size} if (tmp_path / "c-wal").exists() else set()
     out, err, _ = stop(process, number, os.killpg if to_all else os.kill)  # the time is also that of its workers
     assert (process.returncode, out) == (STOP[number], "")
     # What is stored is counted a moment later.
-    counted = r"towline: stopped( after \d+ of 251 plans)?; to continue, repeat the command with --resume c\n"
-    assert re.fullmatch(counted, err), err
+    counted = r"towline: stopped( after \d+ of (251 plans|20000000 samples))?; to continue, repeat the command with "
+    assert re.fullmatch(counted + "--resume c\n", err), err
     # A thread ends the process where it does not end in time: then the log of the checkpoint is left beside it.
     assert {"c", "circle.yaml"} <= set(os.listdir(tmp_path)) <= {"c", "c-wal", "circle.yaml"}
     if Path("/proc/self").exists():
