@@ -202,6 +202,7 @@ def test_what_is_offered_to_robots_suffices_for_the_share():
         assert its.scenario.task.robust == its.robust.share == share
         assert its.share_of_robots(count=60, seed=7).share >= share
         assert (its.scenario.robot == robot) == (name != "uncertainty")
+    assert plan(robot, offers["robust"].plan.scenario.task).feasible
     less = offers["uncertainty"].plan.scenario.robot.uncertainty
     assert less.matrix == pytest.approx(offers["uncertainty"].possible ** 2 * robot.uncertainty.matrix)
 
@@ -214,6 +215,17 @@ def test_a_plan_that_is_infeasible_for_the_file_too_has_offers_for_robots():
     assert offer.plan.feasible
     assert offer.plan.scenario.robot == robot
     assert offer.plan.share_of_robots(count=40, seed=7).share >= 0.95
+
+
+@pytest.mark.parametrize("sigma", [0.02, 0.1])
+def test_a_path_below_the_floor_has_a_shift_that_suffices_for_the_robots(sigma):
+    """With errors of 0.1 m a path just above the floor is too far down for tightened limits."""
+    robot = known("cogiro", sigma).model_copy(update={"floor": 1.0})
+    line = {"kind": "line", "start": [-3, 0.5, 1.5, 0, 0, 0], "end": [3, 0.5, 0.95, 0, 0, 0]}
+    (offer,) = plan(robot, {"path": line, "duration": 5, "robust": 0.95}).relaxations
+    assert offer.name == "shift of the path"
+    assert (offer.possible > 0.051) == (sigma > 0.05)
+    assert plan(robot, offer.plan.scenario.task).feasible
 
 
 LEGS = [[-2, 0.5, 1.5, 0, 0, 0], [2, 0.5, 1.5, 0, 0, 0]]

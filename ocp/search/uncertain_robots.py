@@ -29,7 +29,7 @@ from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
 from ..tasks.task import Task
 
-ROUNDS = 4  # after the plan for the robot of the file; two suffice as a rule
+ROUNDS = 8  # after the plan for the robot of the file; two suffice as a rule
 GROWTH = 1.05  # of what limits are tightened by: the next plan's tensions may be larger
 AT_ONCE = 4096  # instants
 MOST_OF_CURVE = 2000  # instants for the lengths of the curves
@@ -125,13 +125,17 @@ def _most(
 
 
 def _for_others(first: Plan, task: Task, share: float, climb: Climb) -> Offers:
-    """Return what makes a task feasible for the robots that is not even so for the robot of the file."""
-    robot = first.scenario.robot
-    held = _that_hold(first, robot, share)
-    plans = (judged(offer.plan, offer.plan.scenario.robot, share) for offer in first.relaxations)
-    spread = next((GROWTH * plan.robust.reach.max(axis=0) for plan in plans if plan.robust is not None), None)
-    if held.found or spread is None or _narrow(robot, spread, task).any():
-        return held
+    """Return what makes a task feasible for the robots that is not even so for the robot of the file.
+
+    It is what the file's robot needs, if that suffices with tightened limits, or else what these limits need.
+    """
+    robot, plans = first.scenario.robot, {id(offer.plan): offer.plan for offer in first.relaxations}
+    held = {key: for_robots(plan, plan.scenario.task, share, climb) for key, plan in plans.items()}
+    found = [replace(offer, plan=held[id(offer.plan)]) for offer in first.relaxations]
+    found = [offer for offer in found if offer.plan.feasible]
+    spread = next((GROWTH * plan.robust.reach.max(axis=0) for plan in held.values() if plan.robust is not None), None)
+    if found or spread is None or _narrow(robot, spread, task).any():
+        return Offers(found, first.cut_short)
     return _that_hold(climb(lay_out(_tightened(robot, spread), task), None), robot, share)
 
 
