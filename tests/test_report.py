@@ -15,7 +15,7 @@ from rich.console import Console
 
 from towline.base.errors import InputError, TowlineError
 from towline.cli.watching import watching
-from towline.figures import animation, film
+from towline.figures import animation, film, style
 from towline.figures.convergence import convergence, runs
 from towline.figures.style import typeset
 from towline.figures.views import views
@@ -40,6 +40,12 @@ def free():
     found = plan(load("wang-flying"), {"name": "circle", "path": CIRCLE, "base": FREE}, lambda *row: rows.append(row))
     assert found.feasible
     return replace(found, iterates=tuple(rows))
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Leave pictures of pages empty; `test_plots_of_a_plan` draws them."""
+    monkeypatch.setattr(style, "svg", lambda figure: "<svg/>")
 
 
 @pytest.fixture(scope="module")
@@ -197,7 +203,7 @@ class Page(HTMLParser):
             self.rows[-1][cells[-1] == "td"] += data
 
 
-def test_html_tells_the_same_facts_and_loads_nothing(free, impossible, tmp_path):
+def test_html_tells_the_same_facts_and_loads_nothing(free, impossible, undrawn, tmp_path):
     for found, pictures in ((free, 6), (impossible, 4)):
         file = found.save_report(tmp_path / "new" / "report.html")
         text = file.read_text()
@@ -232,7 +238,7 @@ def test_html_tells_the_same_facts_and_loads_nothing(free, impossible, tmp_path)
         free.save_report("/proc/nowhere/report.html")
 
 
-def test_what_comes_from_files_is_escaped(impossible, tmp_path):
+def test_what_comes_from_files_is_escaped(impossible, undrawn, tmp_path):
     evil = '<script>alert("1")</script>&amp;'
     robot = load("wang-flying").model_copy(update={"name": evil, "source": evil})
     task = impossible.scenario.task.model_copy(update={"name": evil})
@@ -262,7 +268,8 @@ def test_convergence_shows_every_run():
         convergence(rows).canvas.draw()
 
 
-def test_plots_of_a_plan(free, impossible, tmp_path):
+def test_plots_of_a_plan(free, impossible, tmp_path, monkeypatch):
+    monkeypatch.setattr(style, "DPI", 20)
     drawn = [path.name for path in free.plot(tmp_path)]
     assert drawn == ["views.png", "tensions.png", "path.png", "base.png", "limits.png", "convergence.png"]
     assert [path.name for path in impossible.plot(tmp_path)] == ["views.png", "tensions.png", "path.png", "base.png"]
