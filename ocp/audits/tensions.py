@@ -65,11 +65,11 @@ class Distribution:
     """
 
     def __init__(self, scenario: Scenario, A: np.ndarray, bounds: tuple[np.ndarray, np.ndarray] | None = None):
-        robot, dof = scenario.robot, len(scenario.robot.platform.dof)
+        robot = scenario.robot
         self.scenario, self.A = scenario, A
         self._bounds = scenario.bounds() if bounds is None else bounds
         self._scaled_A = scaled(scenario, A)
-        self.few, self._inverse = few_and_inverse(self._scaled_A, dof)  # (n, m, 6)
+        self.few, self._inverse = few_and_inverse(self._scaled_A, np.flatnonzero(robot.dof_mask))  # (n, m, 6)
         underactuated = self.few and scenario.count
         self.tolerance = UNDERACTUATED_TOLERANCE * robot.force_scale if underactuated else tolerance_of(robot)
 
@@ -141,22 +141,27 @@ class Distribution:
         return closest, violation, inside
 
 
-def few_and_inverse(A: np.ndarray, dof: int) -> tuple[bool, np.ndarray]:
-    """Return whether some matrix of A (n, 6, m) has fewer than `dof` independent columns, and the inverses (n, m, 6).
+def few_and_inverse(A: np.ndarray, moving: np.ndarray) -> tuple[bool, np.ndarray]:
+    """Return whether some matrix of A (n, 6, m) has fewer independent columns than freedoms, and the inverses.
 
+    The inverses are (n, m, 6). The rows of A that are `moving` are those of the freedoms; the others are zero.
     Nothing else in an audit takes as long as a decomposition of each matrix. Those that are far from losing a row by
     their condition in the Frobenius norm, which is never less than that of the singular values, need none. The inverse
     by A A^T has lost the square of the condition, and one step of Newton's method (Schulz 1933) brings that back.
     """
-    if A.shape[1] == dof <= A.shape[2]:
-        transposed = A.swapaxes(1, 2)
+    n, _, m = A.shape
+    if (dof := len(moving)) <= m:
+        own = A if dof == 6 else A[:, moving]
+        transposed = own.swapaxes(1, 2)
         with suppress(np.linalg.LinAlgError):
-            inverse = transposed @ np.linalg.inv(A @ transposed)
-            inverse += inverse @ (np.eye(dof) - A @ inverse)
-            if (np.linalg.norm(A, axis=(1, 2)) * np.linalg.norm(inverse, axis=(1, 2)) * INDEPENDENT < 1.0).all():
-                return False, inverse
+            inverse = transposed @ np.linalg.inv(own @ transposed)
+            inverse += inverse @ (np.eye(dof) - own @ inverse)
+            if (np.linalg.norm(own, axis=(1, 2)) * np.linalg.norm(inverse, axis=(1, 2)) * INDEPENDENT < 1.0).all():
+                whole = np.zeros((n, m, 6))
+                whole[:, :, moving] = inverse
+                return False, whole
     U, sigma, Vt = np.linalg.svd(A, full_matrices=False)
-    few = A.shape[2] < dof or bool((sigma[:, dof - 1] < INDEPENDENT * sigma[:, 0]).any())
+    few = m < dof or bool((sigma[:, dof - 1] < INDEPENDENT * sigma[:, 0]).any())
     kept = sigma > (INDEPENDENT if few else RANK) * sigma[:, :1]
     reciprocal = np.divide(1.0, sigma, out=np.zeros_like(sigma), where=kept)
     return few, (Vt.swapaxes(1, 2) * reciprocal[:, None]) @ U.swapaxes(1, 2)

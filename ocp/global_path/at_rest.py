@@ -112,7 +112,7 @@ class AtRest:
         else:
             times, still = np.zeros(len(platform)), Motion.still(platform)
             w = scaled(scenario, scenario.required_wrench(times, still, wind=scenario.wind))
-        few, inverse = few_and_inverse(A, len(robot.platform.dof))
+        few, inverse = few_and_inverse(A, np.flatnonzero(robot.dof_mask))
         tensions, missed = self._nearest(A, w, inverse, np.zeros(robot.m))
         exist = known & (missed <= (MISSED if few else BALANCED) * robot.force_scale)
         return A, w, tensions, exist, None if few else inverse
