@@ -140,15 +140,13 @@ def _for_others(first: Plan, task: Task, share: float, climb: Climb) -> Offers:
 
 
 def _that_hold(plan: Plan, robot: Robot, share: float) -> Offers:
-    """Return the offers of a plan, perhaps for tightened limits, that suffice for a share of the robots."""
+    """Return the offers of a plan for tightened limits that suffice for a share of the robots."""
     limited, found = plan.scenario.robot.cables, list[Relaxed]()
     for offer in plan.relaxations:
         its = offer.plan.scenario.robot
-        if its.cables == limited:
-            its = its.model_copy(update={"cables": robot.cables})
-        elif limited != robot.cables:  # what the cables would need without tightened limits is another number
+        if its.cables != limited:  # what the cables would need without tightened limits is another number
             continue
-        held = judged(offer.plan, its, share)
+        held = judged(offer.plan, its.model_copy(update={"cables": robot.cables}), share)
         found += [replace(offer, plan=held)] if held.feasible else []
     return Offers(found, plan.cut_short)
 
