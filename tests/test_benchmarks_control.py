@@ -91,7 +91,7 @@ def test_who_is_right_is_measured_as_right(at_limits):
 
 
 def test_the_command_prints_what_the_design_says(monkeypatch):
-    report = run(30, 1, [FREE, TEAM])
+    report = run(12, 1, [FREE, TEAM])
     monkeypatch.setattr("towline.benchmarks.control.run", lambda steps, seeds, progress: report)
     data = json.loads(CliRunner().invoke(app, ["control", "--json"]).stdout)
     for row in data["rows"]:
