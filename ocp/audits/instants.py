@@ -88,7 +88,7 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
     other_w, other_tensions = (np.stack(each, axis=1)[:, 1:] for each in zip(*cases, strict=True))
     bounded = scenario.limits.along(motion, carriers, result.tensions, off_path, distances=False)
     if not scenario.phases.rest:
-        chosen = within_motors(scenario, times, scaled(scenario, A), cases[0], bounded)
+        chosen = within_motors(scenario, times, distribute.scaled_A, cases[0], bounded)
         if chosen is not result.tensions:
             result = result._replace(tensions=chosen)
             bounded = scenario.limits.along(motion, carriers, chosen, off_path, distances=False)
@@ -102,7 +102,7 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
         off_path=off_path,
         few=distribute.few,
         tolerance=distribute.tolerance,
-        A=scaled(scenario, A),
+        A=distribute.scaled_A,
         w=cases[0][0],
         tensions_unlimited=distribute.unlimited(w),
         gains=distribute.gains,

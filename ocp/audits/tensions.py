@@ -68,8 +68,8 @@ class Distribution:
         robot = scenario.robot
         self.scenario, self.A = scenario, A
         self._bounds = scenario.bounds() if bounds is None else bounds
-        self._scaled_A = scaled(scenario, A)
-        self.few, self._inverse = few_and_inverse(self._scaled_A, np.flatnonzero(robot.dof_mask))  # (n, m, 6)
+        self.scaled_A = scaled(scenario, A)  # moments over `Robot.length`, (n, 6, m)
+        self.few, self._inverse = few_and_inverse(self.scaled_A, np.flatnonzero(robot.dof_mask))  # (n, m, 6)
         underactuated = self.few and scenario.count
         self.tolerance = UNDERACTUATED_TOLERANCE * robot.force_scale if underactuated else tolerance_of(robot)
 
@@ -86,7 +86,7 @@ class Distribution:
         """Return the tensions for the required wrenches w (n, 6), near the preferred ones (n, m) or near zero."""
         scenario, A, few, tolerance = self.scenario, self.A, self.few, self.tolerance
         robot, (low, high) = scenario.robot, self._bounds
-        scaled_A, scaled_w = self._scaled_A, scaled(scenario, w)
+        scaled_A, scaled_w = self.scaled_A, scaled(scenario, w)
         near = np.zeros((len(w), A.shape[2])) if preferred is None else preferred
         open_wrench = scaled_w - np.einsum("nij,nj->ni", scaled_A, near)
         tensions = near + (self._inverse @ open_wrench[..., None])[..., 0]
