@@ -22,7 +22,7 @@ from .soak.exactness import awkward_problem
 
 CORE = Path(__file__).parent.parent / "core" / "distribution"
 SOURCES = sorted(CORE.glob("*.c"))
-FLAGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wdouble-promotion", "-O2"]
+FLAGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wdouble-promotion", "-O0"]
 OPTIMAL, INFEASIBLE, SINGULAR, INACCURATE, INVALID = range(5)
 SHAPES = [(1, 3), (2, 4), (3, 3), (3, 7), (6, 3), (6, 6), (6, 7), (6, 8), (6, 10), (6, 12), (6, 16)]
 
