@@ -14,7 +14,7 @@ from ..models.trajectory import Motion
 from .winch_forces import largest_forces
 
 ACCEPTED = 2e-3  # of a limit's range, up to which differences are inexact
-SLACKER, ROUNDING = 0.1, 1e-6  # of a cable's smallest tension, and of its range: what it may lack
+UNDERSHOOT, ROUNDING = 0.1, 1e-6  # of a smallest tension, and of its range: how far a tension may be below it
 LACKING = 0.01  # of the largest tension: a force that no actuator gives
 
 
@@ -119,7 +119,7 @@ def limits_of(
     tilts, ranges = np.arccos(np.clip(R[..., 2, 2], -1, 1)), zip(robot.t_min, robot.t_max, strict=True)
     rows = list[Row]()
     for i, (low, high) in enumerate(ranges):
-        accepted = min(ACCEPTED, SLACKER * low / _range(low, high) + ROUNDING)  # so that no cable pushes
+        accepted = min(ACCEPTED, UNDERSHOOT * low / _range(low, high) + ROUNDING)  # so that no cable pushes
         rows.append(Row(f"tension {i + 1}", tensions[..., i], low, high, accepted))
     if windings is not None:
         most = enumerate(largest_forces(robot))
