@@ -11,7 +11,7 @@ from ..control.deviation import tolerance_of
 from ..control.noise import Noise
 from ..control.planned_references import references_at
 from ..control.trajectory import read_trajectory
-from ..plant import Plant
+from ..plant import Plant, layout
 from ..plant.plant import History
 from ..plant.reading import sensed
 from .events.faults import Cut
@@ -48,6 +48,9 @@ def simulation_of(plant: Plant, history: History, reference: Any = None, toleran
     record, (motions, lengths) = Record(robot, count), sensed(robot, states)
     record.motions[:], record.lengths[:] = motions, lengths[:, 0]
     record.tensions[:], record.answered[:] = history.tensions, UNCONTROLLED
+    if plant.drive == "lengths" and robot.fixed_lengths is None:
+        first = layout.BODY * (1 + len(robot.carriers)) + layout.REFERENCE * robot.m
+        record.ordered[:] = states[[*range(1, count), -1], first : first + robot.m]
     doubt, keep_out = "", ()
     if reference is None:
         poses, velocities = record.motions[..., :6], record.motions[..., 6:]

@@ -8,8 +8,12 @@ import xarray as xr
 from matplotlib import pyplot
 
 from towline import InputError, load, plan, simulate
+from towline.control import LengthControl
+from towline.estimation.logs.recorded import read_recorded
 from towline.plant import Plant
-from towline.simulation import simulation_of
+from towline.simulation import replay, simulation_of
+from towline.simulation.windows import Windows
+from towline.statics.distribution import tensions as distribute
 from towline.viewer import read
 
 SECONDS, DT = 0.4, 1e-3
@@ -46,10 +50,42 @@ def test_it_is_saved_drawn_and_shown_as_simulations_are(swing, tmp_path):
         assert saved.attrs["title"].startswith("wang-flying, simulation")
     for canvas in run.figures().values():
         pyplot.close(canvas)
-    replay = read(file).replay
-    assert replay is not None
-    assert len(replay.times) == len(run.times)
+    played = read(file).replay
+    assert played is not None
+    assert len(played.times) == len(run.times)
     assert simulate("wang-flying", file, duration=0.01).passed in (True, False)  # a reference like any other
+
+
+def test_its_file_is_replayed(tmp_path):
+    """The file has no commands, since there was no controller: its tensions drive the plant, to the same motion."""
+    plant = Plant("planar-4", drive="tensions")
+    held = np.tile(distribute(plant.robot, plant.robot.home).tensions, (200, 1))
+    history = plant.run(plant.start(velocity=[0.1, 0, 0, 0, 0, 0]), plant.command(held), 4e-3)
+    found = replay("planar-4", simulation_of(plant, history).save(tmp_path / "own.nc"))
+    assert found.passed
+    assert found.windows.drive == "tensions"
+
+
+def test_lengths_that_were_commanded_are_those_of_its_file(tmp_path):
+    """Not the tensions that a controller of lengths expects: cables have l / (1 + t / EA) at each time, unless slow."""
+    planar, EA = load("planar-4"), 3e4
+    cables = tuple(one.model_copy(update={"stiffness": EA, "damping": 60.0}) for one in planar.cables)
+    robot = planar.model_copy(update={"cables": cables})
+    line = {
+        "kind": "line",
+        "start": robot.home[:3].tolist(),
+        "end": (robot.home[:3] + np.array([0.3, 0, 0.2])).tolist(),
+    }
+    run = simulate(robot, line, LengthControl(robot), duration=0.8, period=2e-3)
+    data, plant = run.trajectory, Plant(robot)
+    expected = data.cable_lengths.values / (1 + data.tensions.values / EA)
+    np.testing.assert_allclose(data.lengths_commanded.values, expected, atol=2e-5)
+    commands = plant.command(data.lengths_commanded.values[1:])
+    state = plant.start(run.references[0].pose, lengths=data.lengths_commanded.values[0])
+    own = simulation_of(plant, plant.run(state, commands, run.period)).trajectory
+    np.testing.assert_allclose(own.lengths_commanded.values, data.lengths_commanded.values, atol=1e-5)
+    windows = Windows(read_recorded(robot, run.save(tmp_path / "run.nc")), None, 0.5)
+    assert (windows.drive, windows.measured_command) == ("lengths", False)
 
 
 def test_errors_are_measured_against_a_reference():

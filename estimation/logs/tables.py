@@ -25,7 +25,7 @@ ALWAYS_ACCEPTED = 40_000_000  # [bytes] of numbers, however well a log is compre
 POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 POSE_UNITS = ("m", "m", "m", "rad", "rad", "rad")
 OF_CARRIERS = {"carrier_pose": (POSE, POSE_UNITS), "actuation": (("thrust",), ("N",))}  # of a simulation
-OTHERS = ("carrier", "pose", "tensions_commanded", "cable_directions")
+OTHERS = ("carrier", "pose", "lengths_commanded", "tensions_commanded", "cable_directions")
 WRITTEN = {"cable_lengths": ("l", LENGTHS), "tensions": ("tension", FORCES), "time": ("t", TIMES)}  # by towline
 
 
@@ -138,9 +138,11 @@ def from_netcdf(content: bytes, where: str) -> Recording:
         elif name == "cable_directions" and values.ndim == 3:
             names = [f"direction_{i}_{axis}" for i in range(values.shape[1]) for axis in "xyz"]
             _add(columns, units, names, values.reshape(len(values), -1), ["1"] * len(names))
-        elif name == "tensions_commanded":
-            names = [f"tension_command_{i}" for i in range(values.shape[-1])]
-            _add(columns, units, names, values, ["N"] * len(names))
+        elif name == "lengths_commanded" or (name == "tensions_commanded" and "lengths_commanded" not in arrays):
+            if np.isnan(values).all():  # of a run without a controller
+                continue
+            names = [f"{name.split('s_')[0]}_command_{i}" for i in range(values.shape[-1])]
+            _add(columns, units, names, values, ["m" if name == "lengths_commanded" else "N"] * len(names))
         elif values.ndim == 1:
             if role(name) and "units" not in attributes:
                 raise InputError(f"variable {name} must have the attribute units, got none")
