@@ -23,6 +23,8 @@ from .search import Search
 
 INSTANTS = 120  # at which tensions must exist before a motion is audited
 HALVINGS, OF_PROOFS = 10, 6  # the latter where a program decides what is offered
+# Halvings without a feasible scenario, until the least share decides: with that, a platform may be too light for t_min.
+HOPELESS = 3
 RESERVES = 1.0, 0.98, 0.9  # of the largest share with tensions at these instants, tried in order until an audit passes
 OF_PROGRAMS = 0.5, 0.9  # of it, if programs decide: in order until one has no solution
 LEAST = 0.1  # of it, if the first one has none
@@ -63,7 +65,7 @@ def largest_share(search: Search, change: Change | None) -> list[Relaxed]:
     """Return the variation with the largest share that passes its audit; [] if none is found."""
     if change is None:
         return []
-    largest = _largest(lambda share: change.at(share)[0])
+    largest = _largest(lambda share: change.at(share)[0], least=change.least)
     name = f"audit, other {change.name}"
     found = _planned(search, lambda part: change.at(part * largest)[0], name) if largest else None
     return [] if found is None else [change.offer(found[0] * largest, found[1])]
@@ -127,13 +129,22 @@ def _changed(scenario: Scenario, makers: Sequence[Maker], shares: np.ndarray) ->
     return changes, scenario
 
 
-def _largest(at: Callable[[float], Scenario], low: float = 0.0) -> float:
-    """Return the largest share from a low one on whose scenario may be feasible; the low one if none is known."""
+def _largest(at: Callable[[float], Scenario], low: float = 0.0, least: float = EASIEST) -> float:
+    """Return the largest share from a low one on whose scenario may be feasible; the low one if none is known.
+
+    Where the first halvings find none, the scenario of the `least` share decides whether the others can.
+    """
+
+    def possible(share: float) -> bool:
+        varied = _legal(at, share)
+        return varied is not None and _may_be_feasible(varied)
+
     high = 1.0
-    for _ in range(OF_PROOFS if (most := _legal(at, 1.0)) and by_programs(most) else HALVINGS):
+    for halving in range(OF_PROOFS if (most := _legal(at, 1.0)) and by_programs(most) else HALVINGS):
+        if halving == HOPELESS and not low and not possible(least):
+            break
         middle = (low + high) / 2
-        varied = _legal(at, middle)
-        low, high = (middle, high) if varied and _may_be_feasible(varied) else (low, middle)
+        low, high = (middle, high) if possible(middle) else (low, middle)
     return low
 
 
