@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
 from towline import InputError, Measurements, load, read_measurements
@@ -258,6 +259,34 @@ def test_offsets_hide_how_an_ahrs_is_mounted(tmp_path):
     left = Rotation.from_euler("xyz", found.corrected.poses[:, 3:]) * Rotation.from_rotvec(turns).inv()
     assert np.degrees(left.mean().magnitude()) < 1.0
     assert mistake(robot, found.corrected) is None
+
+
+def test_an_ahrs_is_slightly_askew_and_the_com_is_elsewhere(tmp_path):
+    """Eight cables with tensions, offsets of 0.1 m and a CoM 50 mm off: the sensor is turned by 5.4 degrees."""
+    draw, com = np.random.default_rng(4), [0.04, -0.03, 0.0]
+    corners = np.array([[2.2, 1.8, 3], [-2.2, 1.8, 3], [-2.2, -1.8, 3], [2.2, -1.8, 3]])
+    anchors = np.repeat(corners, 2, axis=0) + draw.normal(0, 0.04, (8, 3))
+    signs = [[1, -1, 1], [-1, 1, -1], [-1, -1, 1], [1, 1, -1], [-1, 1, 1], [1, -1, -1], [1, 1, 1], [-1, -1, -1]]
+    attachments = np.array(signs) * [0.22, 0.18, 0.12]
+    robot = load(user.robot_file(tmp_path / "eight.yaml", anchors, attachments, (0, 0, 1.2, 0, 0, 0), mass=40.0))
+    places, turns = draw.uniform([-0.8, -0.6, 0.8], [0.8, 0.6, 1.5], (16, 3)), draw.normal(0, 0.06, (16, 3))
+    pulls, weight = np.zeros((16, 8)), np.array([0, 0, -40 * 9.81])
+    for k, (place, turn) in enumerate(zip(places, user.turned(turns), strict=True)):
+        arms = attachments @ turn.T
+        lines = anchors - place - arms
+        lines /= np.linalg.norm(lines, axis=1)[:, None]
+        W = np.hstack([lines, np.cross(arms, lines)]).T
+        pulls[k] = lsq_linear(W, -np.concatenate([weight, np.cross(turn @ com, weight)]), (20, 2000), "bvls").x
+    lengths = user.lengths_at(anchors, attachments, places, user.turned(turns)) - draw.uniform(-0.1, 0.1, 8)
+    askew = Rotation.from_euler("xyz", [3, -4, 2], degrees=True)
+    seen = Rotation.from_rotvec(draw.normal(0, 0.007, (16, 3))) * Rotation.from_rotvec(turns) * askew
+    poses = np.hstack([np.full((16, 3), np.nan), seen.as_euler("xyz")])
+    sigma = {"lengths": 1e-3, "rotation": 0.007, "tensions": 0.02}
+    pulls *= 1 + draw.normal(0, 0.02, (16, 8))
+    found = mistake(robot, Measurements(lengths, poses, tensions=pulls, sigma=sigma))
+    assert "the sensor of the orientations looks turned by" in found.text
+    left = Rotation.from_euler("xyz", found.corrected.poses[:, 3:]) * Rotation.from_rotvec(turns).inv()
+    assert np.degrees(left.mean().magnitude()) < 1.5
 
 
 def test_without_a_fit_only_clear_differences_of_orientations_are_errors(tmp_path, monkeypatch):

@@ -17,6 +17,7 @@ from ...models.robot import Robot
 from ..logs.encoders import lengths_of
 from ..logs.measurements import Measurements, measured_poses
 from ..pose.from_lengths import pose_from_lengths
+from .balance import needs_balance
 from .geometry import length_of
 from .hanging import without_slack
 from .interpretations import interpretations
@@ -93,6 +94,12 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
         every = rotation if turn is None else turn(rotation, np.nan_to_num(given.poses[:, 3:]))
         whole = left * Rotation.from_matrix(every) * right
         cost = _fitted(robot, _turned(given, whole))[0] if as_given < np.inf else size
+        if as_given < np.inf and frame == "sensor" and k == 0:  # slightly askew: poses without offsets may hide that
+            askew = _rest(robot, given, whole * right.inv(), frame, up)
+            less = _fitted(robot, _turned(given, whole * right.inv() * askew))[0]
+            if less < cost:
+                cost, whole, left, right = less, whole * right.inv() * askew, none, askew
+                size = float(np.median((whole[rows] * expected.inv()).magnitude()))
         fitted.append((cost, size, frame, left * right, whole, ways[k].text))
     if not fitted:
         return None
@@ -137,7 +144,7 @@ def _fitted(robot: Robot, given: Measurements) -> tuple[float, dict[str, np.ndar
     than most count only up to a limit, as wrong readings should not decide.
     """
     few = np.unique(np.linspace(0, len(given) - 1, min(len(given), MOST_FITTED)).astype(int))
-    groups = ("offsets", "com") if robot.m < robot.dof_mask.sum() else ("offsets",)
+    groups = ("offsets", "com") if needs_balance(robot, given) and robot.weight else ("offsets",)
     model = model_of(robot, given.only(np.isin(np.arange(len(given)), few)), groups, {})
     found, model = fit_from(model, model.begin(), length_of(robot), enough=ENOUGH)
     model, found = without_slack(model, found, length_of(robot))
