@@ -369,3 +369,34 @@ def test_ends_of_cables_stay_in_the_plane_of_a_planar_robot():
     assert result.converged
     assert [one.correction for one in ends] == [0.0] * 4
     np.testing.assert_allclose([one.sigma for one in ends], 0.03, rtol=1e-6)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_errors_that_repeat_with_the_lengths_make_anchors_as_uncertain_as_they_are(seed):
+    """Waves of 2 mm along each cable, as of layers on a drum: more samples would not average them."""
+    built = as_built(600, seed, noise=5e-4)
+    waves = 2e-3 * np.sin(Dynamics(built.robot).cable_lengths(built.poses) * 2 * np.pi / 3 + np.arange(8))
+    mixed = np.random.default_rng(0).permutation(600)
+    for errors, known in ((waves, True), (waves[mixed], False)):
+        log = Measurements(built.readings + errors, built.poses, sigma={"lengths": 5e-4})
+        result = calibrate("cogiro", log, outliers=False)
+        off = (result.robot.anchors - built.robot.anchors).ravel()
+        own = [k for k, one in enumerate(result.parameters) if ".anchor." in one.name]
+        squares = off @ np.linalg.solve(result.covariance[np.ix_(own, own)], off) / len(own)
+        assert 0.2 < squares < 1.8
+        assert (result.repeating is not None) == known
+        if result.repeating:
+            assert "repeat with the lengths of the cables" in result.report()
+            assert 1e-3 < result.repeating.sigma * result.residual_after < 2.5e-3
+
+
+def test_scales_that_explain_errors_that_repeat_are_estimated_too():
+    """Drums 2 % larger than stated: without scales, anchors would be centimetres off; a sound log needs none."""
+    built = as_built(200, 3, noise=5e-4)
+    sound = calibrate("cogiro", Measurements(built.readings, built.poses), outliers=False)
+    assert sound.free == ("anchors", "offsets")
+    result = calibrate("cogiro", Measurements(built.readings / 1.02, built.poses), outliers=False)
+    assert result.free == ("anchors", "offsets", "scales")
+    assert np.abs(result.robot.anchors - built.robot.anchors).max() < 4e-3
+    scales = np.array([one.value for one in result.parameters if one.name.endswith("scale")])
+    np.testing.assert_allclose(scales, 1.02, atol=5e-4)

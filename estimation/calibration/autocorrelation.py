@@ -32,7 +32,7 @@ LEAST = 1e-3  # root of the share of an equation that is left where poses adapt 
 CERTAIN, BY_CHANCE = 3.0, 2.0  # standard deviations of independent errors that neighbours, and others, must exceed
 
 
-class _Kind(NamedTuple):
+class Equations(NamedTuple):
     """Equations of one kind, with poses eliminated and of independent errors: P^1/2 times those of each sample.
 
     Derivatives times a root of the covariance X (n, k, r), residuals (n, k), and P^1/2 (n, k, k).
@@ -43,7 +43,7 @@ class _Kind(NamedTuple):
     P: np.ndarray
 
     @classmethod
-    def of(cls, X: np.ndarray, residuals: np.ndarray, weights: np.ndarray, poses: np.ndarray | None) -> _Kind:
+    def of(cls, X: np.ndarray, residuals: np.ndarray, weights: np.ndarray, poses: np.ndarray | None) -> Equations:
         """Return the equations from P times these and R, (n, k, 6), or None where poses are exact."""
         P = weights[:, :, None] * np.eye(weights.shape[1])
         if poses is None:
@@ -63,8 +63,8 @@ def information_of(model: Model, state: State, root: np.ndarray, white: np.ndarr
     count = len(model.measurements)
     equations = equations_of(model, state)
 
-    def windows() -> Iterator[list[_Kind]]:
-        held: list[list[_Kind]] = []
+    def windows() -> Iterator[list[Equations]]:
+        held: list[list[Equations]] = []
         for part in parts(model, state, equations):
             held.append(list(_kinds(part, root)))
             if sum(len(kinds[0].X) for kinds in held) >= LONGEST:
@@ -74,7 +74,7 @@ def information_of(model: Model, state: State, root: np.ndarray, white: np.ndarr
             yield _joined(held)
 
     short = list(windows()) if count <= LONGEST else None
-    every: Callable[[], Iterator[list[_Kind]]] = windows if short is None else lambda: iter(short)
+    every: Callable[[], Iterator[list[Equations]]] = windows if short is None else lambda: iter(short)
     lags = max(min(count, LONGEST) // SHORT, 1)
     M, found, r = white, list[np.ndarray](), list[np.ndarray]()
     for _ in range(1 if short is None else ROUNDS):  # parameters absorb little of a long log
@@ -105,9 +105,9 @@ def information_of(model: Model, state: State, root: np.ndarray, white: np.ndarr
     return (vectors * np.maximum(values, least)) @ vectors.T, factor
 
 
-def _joined(held: list[list[_Kind]]) -> list[_Kind]:
+def _joined(held: list[list[Equations]]) -> list[Equations]:
     """Return the equations of successive parts of a log, kind by kind."""
-    return [_Kind(*map(np.concatenate, zip(*kinds, strict=True))) for kinds in zip(*held, strict=True)]
+    return [Equations(*map(np.concatenate, zip(*kinds, strict=True))) for kinds in zip(*held, strict=True)]
 
 
 def _autocovariance(X: np.ndarray, lags: int) -> np.ndarray:
@@ -118,7 +118,7 @@ def _autocovariance(X: np.ndarray, lags: int) -> np.ndarray:
     return np.pad(np.fft.irfft(spectrum, size)[: min(lags, n)], (0, max(lags - n, 0)))
 
 
-def _lagged(kind: _Kind, spread: np.ndarray, lags: int) -> np.ndarray:
+def _lagged(kind: Equations, spread: np.ndarray, lags: int) -> np.ndarray:
     """Return sums over samples of e_k'e_(k+l), tr(P_k P_(k+l)), what parameters absorb, and g_k'g_(k+l), (4, lags)."""
     g = np.einsum("nkr,nk->nr", kind.X, kind.residuals)
     return np.stack([_autocovariance(of, lags) for of in (kind.residuals, kind.P, kind.X @ spread, g)])
@@ -136,7 +136,7 @@ def _correlation(products: np.ndarray, spare: np.ndarray, absorbed: np.ndarray, 
     return r[: 1 + (int(ends[0]) if ends.size else len(r) - 1)]
 
 
-def _added(kind: _Kind, r: np.ndarray) -> np.ndarray:
+def _added(kind: Equations, r: np.ndarray) -> np.ndarray:
     """Return the sum of r(|l|) X_k'X_(k+l) over all samples of a kind and l other than 0, (r, r)."""
     X, n = kind.X, len(kind.X)
     r = r[1:n]
@@ -147,20 +147,26 @@ def _added(kind: _Kind, r: np.ndarray) -> np.ndarray:
     return (total + total.T) / 2
 
 
-def _kinds(part: Part, root: np.ndarray) -> Iterator[_Kind]:
-    """Yield the readings of all cables, the balance of forces, and the directions of the cables."""
+def readings_of(part: Part, root: np.ndarray) -> Equations:
+    """Return the equations of the readings of all cables, with derivatives times a root (p, r)."""
+    m = part.model.robot.m
+    rows = (part.without_poses(i) for i in range(m))
+    X = np.stack([J @ root[columns] for J, columns in rows], axis=1)
+    poses = None if part.inverse_root is None else np.stack([part.root(i) for i in range(m)], axis=1)
+    return Equations.of(X, part.residuals.T, part.model.weights.T.astype(float), poses)
+
+
+def _kinds(part: Part, root: np.ndarray) -> Iterator[Equations]:
+    """Yield the equations of readings, of the balance of forces, and of the directions of the cables."""
     model, scale, inverse_root, Y = part.model, part.scale, part.inverse_root, part.Y
     varies, forces, seen = model.parameters.varies, part.derivatives.balance, part.derivatives.directions
-    rows = (part.without_poses(i) for i in range(model.robot.m))
-    X = np.stack([J @ root[columns] for J, columns in rows], axis=1)
-    poses = None if inverse_root is None else np.stack([part.root(i) for i in range(model.robot.m)], axis=1)
-    yield _Kind.of(X, part.residuals.T, model.weights.T.astype(float), poses)
+    yield readings_of(part, root)
     if forces is not None and forces.by_parameters is not None and forces.by_pose is not None:
         H, poses = forces.by_parameters[..., varies] / scale[varies], None
         if inverse_root is not None and Y is not None:
             poses = forces.by_pose * model.poses_vary[:, None] @ np.swapaxes(inverse_root, 1, 2)
             H = H - poses @ Y
-        yield _Kind.of(H @ root, forces.residuals, np.ones_like(forces.residuals), poses)
+        yield Equations.of(H @ root, forces.residuals, np.ones_like(forces.residuals), poses)
     if seen is None or seen.cables is None or seen.robot is None or seen.poses is None:
         return
     found: list[tuple[np.ndarray, np.ndarray]] = []
@@ -175,4 +181,4 @@ def _kinds(part: Part, root: np.ndarray) -> Iterator[_Kind]:
         found.append((J @ root, R))
     X, R = (np.concatenate(of, axis=1) for of in zip(*found, strict=True))
     e = np.concatenate(list(seen.residuals), axis=1)
-    yield _Kind.of(X, e, np.ones_like(e), R)
+    yield Equations.of(X, e, np.ones_like(e), R)

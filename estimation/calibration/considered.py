@@ -8,13 +8,20 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...models.robot import Robot
 from .geometry import length_of
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
-from .parameters import GROUPS, IN_BALANCE, Parameters
+from .parameters import COLUMNS, GROUPS, IN_BALANCE, OF_CABLE, Parameters
 
 ENDS = ("anchors", "attachments")
+OF_THRUSTS = 0.005  # error of thrusts, up to which `thrust_gains` leaves them as they are
 ACCURATE, ACCURATELY = 0.005, 0.001  # [m], and share of the cables' length: errors of cable ends in files
+
+
+def from_thrusts(robot: Robot) -> bool:
+    """Return whether tensions follow from the thrusts of carriers, and so have no load cells with zeros."""
+    return any(carrier.actuators for carrier in robot.carriers)
 
 
 def usual_error(model: Model) -> float:
@@ -25,7 +32,8 @@ def usual_error(model: Model) -> float:
 def considered(model: Model, state: State, inverse: np.ndarray) -> np.ndarray:
     """Return the covariance that errors of fixed cable ends add, (p, p), in the order and units of the parameters.
 
-    These errors are those of the file's `uncertainty`, or the usual ones of ends that it does not contain. The result
+    These errors are those of the file's `uncertainty`, or the usual ones of ends that it does not contain, and those of
+    thrusts from which tensions were computed. The result
     is zero except for parameters of the balance of forces: the geometry is estimated relative to the ends that are
     fixed, but masses and forces are not relative to anything.
 
@@ -36,7 +44,8 @@ def considered(model: Model, state: State, inverse: np.ndarray) -> np.ndarray:
     own = in_balance[varies[varies < len(in_balance)]]
     own = np.pad(own, (0, len(varies) - len(own)))  # slips are last
     result = np.zeros((len(varies), len(varies)))
-    groups = tuple(name for name in GROUPS if name in (*of.groups, *ENDS))
+    thrusts = ("gains",) if from_thrusts(of.robot) and model.measurements.tensions is not None else ()
+    groups = tuple(name for name in GROUPS if name in (*of.groups, *ENDS, *thrusts))
     if not own.any() or groups == of.groups:
         return result
     whole = replace(model, parameters=replace(of, groups=groups))
@@ -47,6 +56,12 @@ def considered(model: Model, state: State, inverse: np.ndarray) -> np.ndarray:
         named = of.places(uncertain.parameters)
         errors[named], errors[:, named] = 0.0, 0.0
         errors[np.ix_(named, named)] = uncertain.matrix
+    if thrusts and "gains" not in of.groups:
+        tensions = np.nanmean(np.abs(model.measurements.tensions), axis=0)
+        masses = np.array([carrier.body.mass if carrier.body else 0.0 for carrier in of.robot.carriers])
+        weights = masses[of.robot.carrier_of_cable] * np.linalg.norm(of.robot.gravity)  # which thrusts carry, too
+        gains = OF_CABLE * np.arange(of.robot.m) + COLUMNS["gains"][0]
+        errors[gains, gains] = (OF_THRUSTS * (1 + weights / tensions)) ** 2
     errors = errors[np.ix_(every[~free], every[~free])]
     scale = metric(model)
     S = NormalEquations.at(whole, state, scale).S

@@ -15,15 +15,16 @@ from ...base.errors import InputError
 from ...models.robot import Robot
 from ..logs.measurements import Measurements
 from .balance import hangs, needs_balance
+from .clock import is_still
+from .considered import from_thrusts
 from .fit import fit
 from .geometry import length_of
 from .hanging import carrying
 from .model import Model, State
-from .parameters import IN_BALANCE, Parameters
+from .parameters import GROUPS, IN_BALANCE, Parameters
 from .solving import Solved, check_enough, cleaned, covariance_of, is_enough, lengths_of, model_of, solve, usual
 from .starts import fit_from
 from .turning import turning
-from .zeros import from_thrusts
 
 REGIONS = 6  # of the workspace
 MOST_COMPARED = 1500  # samples
@@ -31,6 +32,8 @@ ENOUGH = 1e-6  # of the sum of squares, of a step that a fit need not take
 MOST_STEPS = 40  # of a fit with measured poses, which is nearly linear: others do not converge
 FEWEST = 40  # samples in all; of fewer, every other sample is left out
 CHANCE = 3.0  # times the logarithm of the number of residuals, by which a parameter of forces must reduce their squares
+UNEXPLAINED = 1.25  # times the stated standard deviation, of residuals that parameters may explain
+CLEARLY = 1.25  # times smaller errors of validation samples
 WORSE = 1.02  # of the smallest error left out that a smaller set of parameters may have
 CLEANED = {"anchors", "offsets", "clock"}  # found while wrong readings are looked for
 FORCES = ("mass", "com", "capstan", "friction", "zeros")  # of which auto selects
@@ -116,10 +119,7 @@ def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[st
     predicted better. With `outliers`, slips and outliers are removed first. Raises `InputError` if there are too
     few measurements even for the offsets.
     """
-    sets = [one for one in NESTED if "radii" not in one or robot.pulley_radii.any()]
-    turns = turning(robot, measurements)
-    if turns is not None and not turns.enough:
-        sets = [one for one in sets if "attachments" not in one]
+    sets = _nested(robot, measurements)
     check_enough(robot, measurements, ("offsets",), {})
     clock, frames = ("clock",) if "clock" in usual(robot, measurements) else (), measurements.framed
     always = (*clock, *frames)
@@ -129,10 +129,7 @@ def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[st
         # Errors of the poses' velocities let a clock offset seem certain where the lengths hardly change.
         always = frames
     forces = _forces(solved, (*first, *always))
-    if measurements.tensions is not None:
-        sets += [(*one, "stiffness") for one in sets if "offsets" in one]
-    elif hangs(robot, measurements) and solved.model.forces is not None and solved.model.forces.motion_is_known:
-        sets += [(*one, "elasticity") for one in sets if "offsets" in one]
+    sets += [(*one, *_of_stretch(solved)) for one in sets if "offsets" in one and _of_stretch(solved)]
     best = _compare(solved, [(*one, *always, *forces) if one else one for one in sets], {}).best
     for word in forces if best else ():
         without = tuple(name for name in best if name != word)
@@ -140,6 +137,41 @@ def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[st
         if not _clearly_less(solved, whole, less):  # it had only made up for a wrong geometry
             best = without
     return best
+
+
+def extended(solved: Solved, free: tuple[str, ...], prior: dict[str, float]) -> tuple[str, ...]:
+    """Return `free` with attachments, scales, build-up and radii as far as they explain errors that repeat.
+
+    They do if validation samples are predicted clearly better. Stretch of cables is their rival where it can be known.
+    """
+    of = solved.model
+    known = {"anchors", "offsets"} <= {*free} and not of.size_is_open and of.robot.fixed_lengths is None
+    explained = solved.fit.cost < UNEXPLAINED**2 * of.weights.sum()
+    if not known or explained or is_still(of.measurements) or solved.noise.repeating is None:
+        return free
+    sets = [tuple({*free, *one}) for one in _nested(of.robot, of.measurements)]
+    if _of_stretch(solved) and not {"elasticity", "stiffness"} & {*free}:
+        sets += [(*one, "elasticity") for one in sets]
+    held_out = _compare(solved, [*dict.fromkeys(tuple(name for name in GROUPS if name in one) for one in sets)], prior)
+    errors = {one.free: one.left_out for one in held_out.sets}
+    best = held_out.best if CLEARLY * errors[held_out.best] < errors[free] else free
+    return tuple(name for name in best if name in free or name != "elasticity")  # whose own test is stricter
+
+
+def _nested(robot: Robot, measurements: Measurements) -> list[tuple[str, ...]]:
+    """Return the nested sets, without radii if there are no pulleys, or attachments if the platform hardly turns."""
+    turns = turning(robot, measurements)
+    sets = [one for one in NESTED if "radii" not in one or robot.pulley_radii.any()]
+    return [one for one in sets if "attachments" not in one or turns is None or turns.enough]
+
+
+def _of_stretch(solved: Solved) -> tuple[str, ...]:
+    """Return the parameter that stretch of the cables may add, if their tensions are known."""
+    of = solved.model
+    if of.measurements.tensions is not None:
+        return ("stiffness",)
+    hung = hangs(of.robot, of.measurements) and of.forces is not None and of.forces.motion_is_known
+    return ("elasticity",) if hung else ()
 
 
 def _clearly_less(solved: Solved, balance: float, other: float) -> bool:
@@ -233,11 +265,12 @@ def _predict(
         found = fit(model, begin, length, MOST_STEPS, enough=ENOUGH)
     if not found.converged:
         return None
-    weighs = whole.weighs or not set(IN_BALANCE).isdisjoint(free)
-    nothing = replace(whole.only(left), parameters=Parameters(whole.robot, ()), weighs=weighs)
+    # Lengths are predicted at poses as without these parameters: forces would move them.
+    nothing = replace(whole.only(left), parameters=Parameters(whole.robot, ()))
     state = nothing.begin()._replace(x=found.state.x)
     state = fit_from(nothing, state, length, enough=ENOUGH)[0].state
-    return _mean_square(model, found.state), _mean_square(nothing, state), _unbalanced(nothing, state)
+    weighed = replace(nothing, weighs=whole.weighs or not set(IN_BALANCE).isdisjoint(free))
+    return _mean_square(model, found.state), _mean_square(nothing, state), _unbalanced(weighed, state)
 
 
 def _unbalanced(model: Model, state: State) -> float:

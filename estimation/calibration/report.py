@@ -162,6 +162,14 @@ def _of_noise(result: CalibrationData) -> list[str]:
             f"the platform turns by {by}, which moves its attachments by {_mm(turns.shift)}: errors of the model may "
             "look like displaced attachments; turn it farther, or leave them out of --free"
         )
+    if (again := result.repeating) is not None:
+        what, cause = (
+            ("lengths of the cables", "layers on their drums") if again.of_lengths else ("pose", "pulleys or stretch")
+        )
+        lines.append(
+            f"errors of {_mm(again.sigma * result.residual_after)} repeat with the {what}, as of {cause} that the "
+            "model lacks, and more samples do not average them: the standard deviations below include them"
+        )
     if result.autocorrelation > 1:
         tense = result.measurements.tensions is not None or hangs(result.file, result.measurements)
         lines.append(

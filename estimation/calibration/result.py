@@ -17,13 +17,14 @@ from ...models.part import LARGEST
 from ...models.robot import Robot
 from ..logs.measurements import Measurements
 from .clock import is_still
-from .cross_validation import HeldOut, compare, poses_fitted
+from .cross_validation import WORSE, HeldOut, compare, poses_fitted
 from .differences import PLAUSIBLE
 from .geometry import length_of
 from .load_changes import load_changes
 from .outliers import Outlier, Slip
-from .parameters import Parameters
+from .parameters import IN_BALANCE, Parameters
 from .plausibility import Mistake
+from .repeating_errors import Repeating
 from .solving import Noise, Solved, covariance_of, inflation_of, lengths_of
 
 EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
@@ -114,7 +115,10 @@ class CalibrationData(Displayed):
             texts = [f"{quantity(mass, 'kg', digits=3)} {self._since(begin)}" for begin, mass in loads]
             return f"the mass changes during the log: {', '.join(texts)}; calibrate each part alone"
         held_out = self.held_out
-        if np.isfinite(held_out.after) and held_out.after > max(held_out.before, EXACT * self.stated_sigma):
+        # Lengths alone do not judge parameters of forces.
+        worse = 1.0 if set(IN_BALANCE).isdisjoint(self.free) else WORSE
+        least = max(worse * held_out.before, EXACT * self.stated_sigma)
+        if np.isfinite(held_out.after) and held_out.after > least:
             before, after = (quantity(1e3 * error, "mm", digits=3) for error in (held_out.before, held_out.after))
             return (
                 f"validation samples fit worse than with the file's robot: {after} instead of {before}; keep the file, "
@@ -240,6 +244,11 @@ class CalibrationData(Displayed):
     def autocorrelation(self) -> float:
         """Return the factor of the covariance for autocorrelated errors, else 1."""
         return self._noise.autocorrelation
+
+    @property
+    def repeating(self) -> Repeating | None:
+        """Return errors of the lengths that repeat with the pose or the lengths, which sigmas include, or None."""
+        return self._noise.repeating
 
     @property
     def identifiable(self) -> tuple[str, ...]:

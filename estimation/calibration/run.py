@@ -7,7 +7,7 @@ from ...base.inputs import flag
 from ...models.files import AnyRobot, as_robot
 from ..logs.measurements import Measurements, check_measurements, tracked
 from .calibration import Calibration
-from .cross_validation import select
+from .cross_validation import extended, select
 from .file_errors import errors_of_file, loose
 from .geometry import length_of
 from .parameters import GROUPS, IN_BALANCE, check_free, check_prior
@@ -17,6 +17,7 @@ from .solving import check_enough, solve, usual
 from .stretch import is_elastic, uses_slack, with_elasticity, with_stretch
 from .zeros import has_zeros, with_zeros
 
+ROUNDS_OF_STRETCH = 2  # without and with further parameters of the geometry
 ROUNDS_OF_SLACK = 3
 
 
@@ -39,8 +40,9 @@ def calibrate(
         free: Parameters to estimate (see docs/howto/calibrate.md): any of anchors, attachments, offsets, scales,
             radii, build-up, clock, frame, body, com and elasticity, and with tensions also mass, stiffness, capstan,
             friction, gains and zeros. Default: anchors and offsets, and the clock if times and poses of a motion were
-            measured. Or "auto": the smallest set whose cross-validation error is close to the smallest one; this set
-            may be empty.
+            measured. With anchors and offsets, towline adds attachments, scales, build-up and radii as far as they
+            explain errors that repeat with the pose. Or "auto": the smallest set whose cross-validation error is close
+            to the smallest one; this set may be empty.
         prior: Standard deviations of the file's values, in the units of the parameters, by the names of `free`, such as
             {"anchors": 0.02}. Default: no prior; unobservable directions change as little as possible.
         outliers: True to detect outliers, which are left out, and slipped winches, whose cable gets a new offset after
@@ -88,11 +90,15 @@ def calibrate(
     if has_zeros(solved):
         groups, priors = with_zeros(given, groups, priors)
         solved = solve(chosen, given, groups, priors, outliers)
-    if (near := with_stretch(solved)) is not None:
-        longer, sigmas = with_elasticity(solved)
-        elastic = solve(chosen, given, longer, sigmas, outliers, near)
-        if is_elastic(elastic):
-            groups, priors, solved = longer, sigmas, elastic
+    for _ in range(ROUNDS_OF_STRETCH):
+        if (near := with_stretch(solved)) is not None:
+            longer, sigmas = with_elasticity(solved)
+            elastic = solve(chosen, given, longer, sigmas, outliers, near)
+            if is_elastic(elastic):
+                groups, priors, solved = longer, sigmas, elastic
+        if (found and found.severe) or (longer := extended(solved, groups, priors)) == groups:
+            break
+        groups, solved = longer, solve(chosen, given, longer, priors, outliers)
     for _ in range(ROUNDS_OF_SLACK):
         if not uses_slack(solved):
             break

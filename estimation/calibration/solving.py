@@ -30,6 +30,7 @@ from .outliers import LEAST_THRESHOLD, SHORTEST, Outlier, Slip, find_outliers, f
 from .parameters import IN_BALANCE, OF_ROBOT, Parameters
 from .pose_noise import keeping, observed
 from .projection import out_of_plane
+from .repeating_errors import Repeating, repeating
 from .sightings import sighted
 from .starts import NEAR_THE_FILE, fit_from, level_poses
 
@@ -53,6 +54,7 @@ class Noise(NamedTuple):
         autocorrelation: Factor of the variances because errors are autocorrelated.
         redundancy: Number of readings minus number of unknowns, of which priors determine a part.
         covariance, information: Those of the parameters, in metres, (p, p), zero along unobservable directions.
+        repeating: Errors of lengths that repeat with the pose or the lengths, or None.
     """
 
     excess: float
@@ -60,6 +62,7 @@ class Noise(NamedTuple):
     redundancy: float
     covariance: np.ndarray
     information: np.ndarray
+    repeating: Repeating | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,13 +104,18 @@ class Solved(Displayed):
         if redundancy <= 0:
             return Noise(np.nan, 1.0, redundancy, seen.covariance, seen.information)
         excess = float(np.sqrt(max(self.fit.cost - float(((moved / sigmas) ** 2).sum()), 0.0) / redundancy))
-        M, more = information_of(model, state, V * roots, np.eye(seen.rank) - D)
+        if not seen.rank:
+            return Noise(excess, 1.0, redundancy, seen.covariance, seen.information)
+        white = np.eye(seen.rank) - D
+        M, more = information_of(model, state, V * roots, white)
+        again = repeating(model, state, V * roots)
+        M = M if again is None else again.larger(M, white)
         larger = max(1 / more, excess**2)  # smoothing of poses makes their noise smaller, but autocorrelated
         shares, turn = np.linalg.eigh((V / roots).T @ seen.covariance @ (V / roots))
         wide = (turn * np.sqrt(np.maximum(shares, 0.0))) @ turn.T
         M = larger * M + D + out_of_plane(model, state, V * roots)
         spread = roots[:, None] * (wide @ M @ wide) * roots
-        return Noise(excess, more, redundancy, V @ spread @ V.T, V @ np.linalg.inv(spread) @ V.T)
+        return Noise(excess, more, redundancy, V @ spread @ V.T, V @ np.linalg.inv(spread) @ V.T, again)
 
 
 def usual(robot: Robot, measurements: Measurements) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from .balance import hangs
-from .considered import usual_error
+from .considered import from_thrusts, usual_error
 from .fit import held
 from .geometry import length_of
 from .hanging import carrying
@@ -20,7 +20,6 @@ from .normal_equations import NormalEquations, metric
 from .parameters import COMMON, GROUPS
 from .solving import Solved, covariance_of
 from .turning import turning
-from .zeros import from_thrusts
 
 POSSIBLE, CERTAIN = 3.0, 4.0  # standard deviations of a compliance: of independent errors, and of all
 UNEXPLAINED = 1.5  # times the stated standard deviation, of residuals that the model does not explain

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...models.robot import Robot
 from ..logs.load_cells import unreadable
 from ..logs.measurements import Measurements
 from ..pose.estimate import largest_cost
+from .considered import from_thrusts
 from .fit import held
 from .geometry import length_of
 from .normal_equations import NormalEquations, metric
@@ -29,11 +29,6 @@ def with_zeros(
     """Return parameters and standard deviations about the file's values with the zeros of load cells."""
     assert measurements.tensions is not None
     return (*groups, "zeros"), prior | {"zeros": USUAL * float(np.abs(measurements.tensions).mean())}
-
-
-def from_thrusts(robot: Robot) -> bool:
-    """Return whether tensions follow from the thrusts of carriers, and so have no load cells with zeros."""
-    return any(carrier.actuators for carrier in robot.carriers)
 
 
 def has_zeros(solved: Solved) -> bool:
