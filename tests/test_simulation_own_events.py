@@ -122,8 +122,8 @@ def test_a_wall_without_damping_gives_back_the_energy_of_an_impact(robot, stiffn
 def test_a_wall_never_pulls(robot):
     wall = Wall(at=0.0, point=(0, 0, 0), normal=(0, 0, 3), stiffness=100.0, damping=1e4, radius=0.1)
     motions = np.zeros((3, 2, 12))
-    motions[:, 0, 2] = [0.2, 0.05, 0.05]  # apart, inside, inside and quickly out
-    motions[:, 0, 8] = [-1.0, -0.1, 1.0]
+    motions[:, 0, 2] = [0.1, 0.05, 0.05]  # at rest where it begins, inside, inside and quickly out
+    motions[:, 0, 8] = [0.0, -0.1, 1.0]
     wrench = wall.wrench(0.0, motions)
     np.testing.assert_allclose(wrench[:, 2], [0.0, 100 * 0.05 + 1e4 * 0.1, 0.0])
     assert not np.delete(wrench, 2, axis=1).any()

@@ -18,6 +18,7 @@ from .event import Event, Running, Seconds, number_in
 
 ROUNDING = 1e-9  # of a force or moment, which may have been computed
 PART = 0.2  # of the time constants of a wall: longest step
+TINY = 1e-200  # [m], instead of no change
 
 
 class Carry(RigidLoad, Event):
@@ -173,8 +174,8 @@ class Wall(Lasting):
         begins = self.radius - ((position - np.array(self.point)) * normal).sum(axis=1)
         speed = -(velocity * normal).sum(axis=1)
         ends = begins + self._step * speed
-        deeper, change = np.maximum(begins, ends), np.abs(ends - begins)
-        share = np.where(deeper > 0, np.minimum(deeper / np.where(change > 0, change, deeper), 1.0), 0.0)  # in contact
+        change = np.maximum(np.abs(ends - begins), TINY)
+        share = np.clip(np.maximum(begins, ends) / change, 0.0, 1.0)  # of the step, in contact
         depth = (np.maximum(begins, 0.0) + np.maximum(ends, 0.0)) / 2
         force = share * (self.stiffness * depth + self.damping * speed)
         result = np.zeros((len(motions), 6))
