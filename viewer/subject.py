@@ -28,7 +28,7 @@ class Subject(Displayed):
 
     Attributes:
         title: Its title, one line.
-                robot: The robot, also of a plan, a simulation or a workspace.
+        robot: The robot, also of a plan, a simulation or a workspace.
         replay: The instants of a plan or a simulation, or None.
         cloud: The points of a workspace, or None.
         other: A plan or a simulation of the same robot to compare the replay with, or None.

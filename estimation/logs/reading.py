@@ -81,8 +81,8 @@ def read_measurements(
             names.
 
     Raises:
-        InputError: If a file cannot be read, a field has an unknown unit, a length, tension or time is missing, times
-            do not increase, or clocks cannot be aligned.
+        InputError: If a file cannot be read, a field has an unknown unit, more than a fifth of the samples lack a
+            length or a tension (fewer are left out), times do not increase, or clocks cannot be aligned.
     """
     return read_log(path, sigma, poses, robot, fields).measurements
 

@@ -38,8 +38,8 @@ class PoseEstimate(Displayed):
         ambiguous: True if the search found another pose that may be the true one, (...): it passes the fit test at the
             0.01 % level, even if the cables cannot hold it with the file's CoM and load. Always False with a start.
         by_gravity: True if the lengths alone do not determine the pose, and gravity fixes it, (...).
-        known_covariance: Covariance due to noise, (..., 6, 6), of one pose near a start, and of equilibria, whose
-            covariance does not follow from the lengths alone; otherwise None.
+        known_covariance: Covariance due to noise, (..., 6, 6), if the search has computed it: for a single pose with a
+            start, and for equilibria; otherwise None.
         by_parameters: Covariance of equilibria due to the `uncertainty` of the robot file, (..., 6, 6), zero for other
             poses; None without any.
     """

@@ -94,9 +94,9 @@ def time_along(robot: AnyRobot, task: Task | dict[str, Any] | str | os.PathLike[
         Plan: Audited like every plan. Its task contains the time law, so `plan` audits the same motion again; `law`
             contains the active limit on each part of the path (`bottlenecks`). Status `infeasible`: no tensions inside
             their limits give the required wrench at `law.at`, whatever the speed and acceleration (at the ends: at
-            rest), or the path leaves the workspace box, the floor or the reach of a carrier (`audit.excess`). The
-            motion then only shows the path, in 10 s. Status `not-found`: every grid point allows some speed, but no
-            time law connects them, or none passes the audit.
+            rest), or the path goes below the floor, or leaves the workspace box or the reach of a carrier
+            (`audit.excess`). The motion then only shows the path, in 10 s. Status `not-found`: every grid point allows
+            some speed, but no time law connects them, or none passes the audit.
 
     Raises:
         InputError: If an argument is invalid, the task does not fit the robot or has keys that a time law along a path
