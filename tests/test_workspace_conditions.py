@@ -463,6 +463,8 @@ def test_one_bad_pose_is_no_and_leaves_the_others_alone():
         ({"kind": "lengths", "min": [2, 1], "max": [3, 0.5]}, "min must not exceed max"),
         ({"kind": "lengths", "min": [1, 2], "max": 1.5}, "min must not exceed max"),
         ({"kind": "interference", "between_cables": 0}, "between_cables must be greater than 0"),
+        ({"kind": "interference", "clearance": 0.1}, "between_cables, platform or obstacles must be given"),
+        ({"kind": "lengths"}, "min above 0 or max must be given"),
     ],
 )
 def test_wrong_conditions_are_told_in_a_line(data, told):

@@ -5,10 +5,10 @@ Cables are the straight segments from anchor to attachment. Sources: Ericson, Re
 """
 
 from itertools import combinations
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from ...models import Robot
 from ...models.part import Box, NonNegative, Positive, optional
@@ -38,6 +38,12 @@ class Interference(Condition):
     )
     obstacles: tuple[Obstacle, ...] = optional("spheres, capsules, boxes and convex meshes in {G}", ())
     clearance: NonNegative = optional("minimum distance between cables and obstacles [m]", 0.0)
+
+    @model_validator(mode="after")
+    def _has_a_limit(self) -> Self:
+        if self.between_cables is None and self.platform is None and not self.obstacles:
+            raise ValueError("between_cables, platform or obstacles must be given, got none of them")
+        return self
 
     def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         with np.errstate(over="ignore", invalid="ignore"):  # of places that are far too far away

@@ -22,9 +22,9 @@ class Lengths(Condition):
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
-        if self.max is None:
-            return self
-        least, most = np.atleast_1d(self.min), np.atleast_1d(self.max)
+        least, most = np.atleast_1d(self.min), np.atleast_1d(np.inf if self.max is None else self.max)
+        if self.max is None and not least.any():
+            raise ValueError("min above 0 or max must be given, got neither")
         # If min and max have different numbers of cables, one of them does not fit the robot: `evaluate` reports it.
         if (1 in (least.size, most.size) or least.size == most.size) and np.greater(least, most).any():
             raise ValueError(f"min must not exceed max, {self.max} m, got {self.min} m")
