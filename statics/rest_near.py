@@ -81,7 +81,9 @@ def _newton(
     pose = starts.copy()
     A = (dynamics.wrench_matrix(pose, carriers) * robot.wrench_scale[:, None])[:, rows]
     tensions = -np.linalg.pinv(np.nan_to_num(A), 1e-9) @ weight * unit
-    taut, left = tensions > SLACK * robot.weight, np.arange(len(lengths))  # as it would be if it rested at the start
+    taut = tensions > SLACK * robot.weight  # as it would be if it rested at the start
+    taut |= not weight.any()  # where nothing pulls, poses at which the cables are just straight come nearest to a rest
+    left = np.arange(len(lengths))
     for _ in range(NEWTON):
         system = _system(robot, dynamics, pose[left], tensions[left], carriers[left], taut[left])
         beyond = dynamics.cable_lengths(pose[left], carriers[left]) - lengths[left]

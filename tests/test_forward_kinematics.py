@@ -489,6 +489,17 @@ def test_newton_finds_the_rests_of_least_energy_with_slack_cables(monkeypatch):
             np.testing.assert_allclose(rests.energy[row], one.energy, atol=1e-5)
 
 
+def test_a_platform_on_a_table_follows_its_lengths():
+    """Gravity along the locked axis pulls no cable taut, but at the start its two cables would be 65 mm too long."""
+    data = load("planar-4").model_dump(mode="json")
+    robot = Robot.model_validate(data | {"gravity": [0, -9.81, 0], "cables": data["cables"][:2]})
+    lengths = 1.05 * dynamics_of(robot).cable_lengths(robot.home)
+    found = pose_from_lengths(robot, lengths, robot.home)
+    assert found.converged
+    assert np.isinf(found.sigmas[[0, 2, 4]]).all()
+    np.testing.assert_allclose(dynamics_of(robot).cable_lengths(found.pose), lengths, atol=1e-9)
+
+
 @pytest.mark.parametrize(("name", "most"), [("cogiro", 3.3), ("ipanema-1", 6.0)])
 def test_noise_costs_few_steps(name, most):
     """About the home of ipanema-1 the matrix of Gauss and Newton alone takes ten steps."""
