@@ -465,6 +465,7 @@ def test_one_bad_pose_is_no_and_leaves_the_others_alone():
         ({"kind": "interference", "between_cables": 0}, "between_cables must be greater than 0"),
         ({"kind": "interference", "clearance": 0.1}, "between_cables, platform or obstacles must be given"),
         ({"kind": "lengths"}, "min above 0 or max must be given"),
+        ({"kind": "metric", "metric": "payload"}, "metric: min or max must be given"),
     ],
 )
 def test_wrong_conditions_are_told_in_a_line(data, told):

@@ -15,6 +15,7 @@ from pydantic import BeforeValidator, Field, SerializeAsAny
 from ..base.errors import InputError
 from ..base.inputs import number, required, shown
 from ..models import Robot
+from ..models.parsing import validate
 from ..models.part import Part, Share, optional
 from .feasibility import too_few_cables
 from .places import Places, check_places
@@ -102,7 +103,8 @@ def condition_from(data: Any) -> Condition:
         raise InputError(f"condition must be a mapping with a kind, one of {accepted}, got {shown(data)}")
     if not isinstance(data["kind"], str) or data["kind"] not in Condition.kinds:
         raise InputError(f"condition.kind must be one of {accepted}, got {shown(data['kind'])}")
-    return Condition.kinds[data["kind"]](**{str(name): value for name, value in data.items()})
+    fields = {str(name): value for name, value in data.items()}
+    return validate(fields, Condition.kinds[data["kind"]], data["kind"])
 
 
 def for_robots(condition: Condition, share: float | None) -> Condition:
