@@ -8,7 +8,8 @@ positions and velocities have the noise s_x and s_v, keeps
 Defaults keep 0.03 g on robots with at least as many cables as degrees of freedom, whose winches follow the noise.
 States without a time are predicted over the known delay. It may be wrong by 30 %, and T is twice that. Two standard
 deviations of the tensions that noise of velocities requires are inside the limits at home. At about twice these bounds
-robots were lost in simulations with an independent plant.
+robots were lost in simulations with an independent plant. Commands to winches that lag amplify the noise, and leave as
+much of the lag as T permits where the noise permits no more.
 
 The attitude loops of flying carriers, phi'' = -2 h phi' - h^2 phi, are stable up to h lag = 2 with drives that lag
 (Routh), up to h delay = 0.647 with late states (their phase where the gain is 1), and up to h period = 1 with states
@@ -70,13 +71,15 @@ PATIENT, STILL = Usual(40.0, 60.0, 2.0, 0.03), Usual(40.0, 60.0, 2.0, 0.015)
 class Bandwidths(NamedTuple):
     """Bandwidths [rad/s]: of the error, (6,), of the observers, and of the attitude loops of flying carriers.
 
-    `lead`: by which factor commands to winches may amplify the noise of the tensions.
+    `lead`: by which factor commands to winches may amplify the noise of the tensions; and `lag`: time constant that may
+    remain of winches [s], for which they may amplify it more.
     """
 
     bandwidth: np.ndarray
     observer: float
     attitude: float
     lead: float = np.inf
+    lag: float = np.inf
 
 
 def bandwidths_for(
@@ -118,7 +121,8 @@ def bandwidths_for(
             f"{LOST * part * given[1]:.2g} rad/s with {reason}, got {given[0].max():g} and {given[1]:g} rad/s"
         )
     lead = max(errors.permit_noise(float(given[0].max()), given[1], errors.calm), 1.0)
-    return Bandwidths(*given, _attitude_for(robot, errors, lag, h), lead)
+    remains = 1.0 / max(float(given[0].max()) + given[1], TINY) - errors.late + WINCHES_KEEP
+    return Bandwidths(*given, _attitude_for(robot, errors, lag, h), lead, remains)
 
 
 def _attitude_for(robot: Robot, errors: "_Errors | None", lag: float, given: float | None) -> float:

@@ -91,7 +91,7 @@ class ComputedTorque(Controller):
             takes a tenth of a second.
         tension_lag, rotor_lag: Known time constants with which winches and actuators of flying carriers follow commands
             [s]. Commands are sent ahead of time, within limits and rates, so that only 5 ms of the first and 15 ms of
-            the second remain.
+            the second remain. Noise of `sensors` leaves more of the first, up to what the bandwidths permit.
         sensors: Errors and delay of the sensors, a `simulation.Noise` or a mapping (default: unknown). The delay is
             the age of states without a time. The default bandwidths are then the largest that these sensors permit
             (control/bandwidths.py), at most twice those above.
@@ -142,7 +142,7 @@ class ComputedTorque(Controller):
         loop, lag = number("tension_loop", tension_loop, 0.0, 1e3), number("tension_lag", tension_lag, 0.0, 1.0)
         self._ahead = tension_lead(self.robot, self._limits, lag, rotors)
         if self._ahead is not None:
-            self._ahead.amplify(loops.lead)
+            self._ahead.amplify(loops.lead, loops.lag)
         self._loop = TensionLoop(loop, WINCHES_KEEP if self._ahead is None else 0.0, *self._limits) if loop else None
         self._little = np.maximum(self._limits.low, SOMETHING * self._limits.high)
         self._boxes = boxes(self.robot) if far.any() else None

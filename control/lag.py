@@ -51,9 +51,12 @@ class Lead:
         self._ratio, self._lag, self._limits, self._rate = max(lag / left, 1.0), lag, (low, high), rate
         self.reset()
 
-    def amplify(self, most: float) -> None:
-        """Multiply noise of what the drives should give by `most`, from 1 on, at most; more of the lag remains then."""
-        self._ratio = min(self._ratio, most)
+    def amplify(self, most: float, longest: float) -> None:
+        """Multiply noise of what the drives should give by `most`, from 1 on, at most, and leave more of the lag.
+
+        If more than `longest` [s] were left, the noise is multiplied by more than that.
+        """
+        self._ratio = min(self._ratio, max(most, self._lag / max(longest, SHORTEST)))
 
     def reset(self) -> None:
         """Forget all earlier steps."""

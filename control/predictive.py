@@ -145,7 +145,7 @@ class Predictive(ComputedTorque):
         super().__init__(the_robot, observer=own.observer, reach=reach, **loops)
         self._known_age, self._beside._ahead = self._beside._known_age, None  # drives do not follow its commands
         if self._ahead is not None:
-            self._ahead.amplify(own.lead)
+            self._ahead.amplify(own.lead, own.lag)
         set_reach(self._settings, reacts)
         self._followed, self._far = np.flatnonzero(flies & ~far.any(axis=1)), (far, flies)
         # Cables of a fixed length have the tensions that carriers make of them, whatever is commanded.
