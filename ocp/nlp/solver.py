@@ -34,9 +34,6 @@ MOST_ITERATIONS = 400
 # iteration of a team past obstacles takes less than half of the time that it takes with MUMPS's own choice. Without a
 # permutation that scales it would take another tenth less, but short motions of teams are then not found.
 TEAM = {"mumps_pivtol": 1e-4, "mumps_pivot_order": 5}
-# Robots on the ground need no step of refinement where residuals are small without one, and no more accuracy than this
-# before the barrier falls: 24 plans took 4 % less time an iteration and 4 % less iterations. A slung load needs both.
-GROUND = {"min_refinement_steps": 0, "barrier_tol_factor": 30.0}
 # What IPOPT adds to constraints where MUMPS calls their Jacobian singular. The motion of a quadrotor with a slung load
 # follows from that of the load. Only accelerations of the nodes remain, times the square of a step: much less than
 # IPOPT's default, 1e-8, with which each step is far from Newton's. A minimum time took 300 iterations; it takes 36.
@@ -138,7 +135,7 @@ class Solver:
         scenario = self.program.scenario
         thrusts = any(scenario.robot.carriers[index].efforts for index, _ in scenario.carrier_free)
         accuracy = {"tol": 1e-8, "constr_viol_tol": 1e-9, "max_iter": self._max_iterations} | NEARLY_SINGULAR
-        accuracy |= GROUND if not thrusts else TEAM if scenario.count > MANY else {}
+        accuracy |= TEAM if thrusts and scenario.count > MANY else {}
         # What its check of the inputs warns of, more equations than unknowns, is an answer here: no solution.
         options = {"print_time": False, "error_on_fail": False, "inputs_check": False, "calc_lam_p": False}
         options |= {"ipopt": {"print_level": 0, "sb": "yes"} | accuracy | start, "iteration_callback": self._watch}
