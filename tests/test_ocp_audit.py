@@ -14,6 +14,7 @@ from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, plan
 from towline.ocp.audits.audit import audit
 from towline.ocp.audits.excess import Excess
+from towline.ocp.audits.tensions import few_and_inverse
 from towline.ocp.tasks.deviation import Deviation
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
@@ -344,3 +345,15 @@ def test_the_certificate_of_few_cables_is_that_of_the_worst_instant(name, durati
         A, w = scale[:, None] * matrices[row], scale * required[row]
         missing = np.linalg.norm(w - A @ np.linalg.lstsq(A, w)[0])  # of tensions of any sign
         assert missing <= worst.shortfall * (1 + 1e-6)
+
+
+@pytest.mark.parametrize(("moving", "m"), [([0, 2, 4], 4), ([0, 1, 2], 4), ([*range(6)], 6), ([*range(6)], 8)])
+def test_cables_that_lose_a_freedom_are_few_and_have_the_pseudo_inverse(moving, m):
+    """Rounding gives products A A^T of these ranks an inverse, of which 9 in 10 looked like one of full rank."""
+    draw, n = np.random.default_rng(m), len(moving)
+    for rank in [*range(1, n + 1)] * 20:
+        A = np.zeros((1, 6, m))
+        A[0, moving] = draw.normal(size=(n, rank)) @ draw.normal(size=(rank, m))
+        few, inverse = few_and_inverse(A, np.array(moving))
+        assert few or rank == n
+        np.testing.assert_allclose(A[0] @ inverse[0] @ A[0], A[0], atol=1.1e-3 * np.linalg.norm(A[0], 2))

@@ -23,6 +23,7 @@ from ..tasks.wind_set import WindBox, WindSet, as_wind, decisive_winds_at, possi
 TOLERANCE = 1e-6  # [N], and of the characteristic force of robots below 1 N
 UNDERACTUATED_TOLERANCE = 1e-3  # of the weight, for robots with fewer independent cables than degrees of freedom
 RANK = 1e-9  # of the largest singular value: along less nothing is given
+INVERTED = 1e-3  # of the identity, in the Frobenius norm: what a product with an inverse may lack before Newton's step
 EXACT = 1e-12  # relative, of the wrench: tensions by pseudo-inverse that miss more are solved for again
 NEAREST = 1e10  # weight of the wrench error beside the tensions: so large that these do not shift it
 INNER_WINDS = 8  # of a box, at each instant others
@@ -147,7 +148,8 @@ def few_and_inverse(A: np.ndarray, moving: np.ndarray) -> tuple[bool, np.ndarray
     The inverses are (n, m, 6). The rows of A that are `moving` are those of the freedoms; the others are zero.
     Nothing else in an audit takes as long as a decomposition of each matrix. Those that are far from losing a row by
     their condition in the Frobenius norm, which is never less than that of the singular values, need none. The inverse
-    by A A^T has lost the square of the condition, and one step of Newton's method (Schulz 1933) brings that back.
+    by A A^T has lost the square of the condition, and one step of Newton's method (Schulz 1933) brings that back. What
+    it left before that proves that no row is lost: of a singular matrix, rounding makes an inverse of any size.
     """
     n, _, m = A.shape
     if (dof := len(moving)) <= m:
@@ -155,8 +157,10 @@ def few_and_inverse(A: np.ndarray, moving: np.ndarray) -> tuple[bool, np.ndarray
         transposed = own.swapaxes(1, 2)
         with suppress(np.linalg.LinAlgError):
             inverse = transposed @ np.linalg.inv(own @ transposed)
-            inverse += inverse @ (np.eye(dof) - own @ inverse)
-            if (np.linalg.norm(own, axis=(1, 2)) * np.linalg.norm(inverse, axis=(1, 2)) * INDEPENDENT < 1.0).all():
+            missing = np.eye(dof) - own @ inverse
+            inverse += inverse @ missing
+            size, own_size, inverse_size = (np.linalg.norm(each, axis=(1, 2)) for each in (missing, own, inverse))
+            if ((size < INVERTED) & (own_size * inverse_size * INDEPENDENT < 1.0)).all():
                 whole = np.zeros((n, m, 6))
                 whole[:, :, moving] = inverse
                 return False, whole
