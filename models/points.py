@@ -13,7 +13,7 @@ NEARLY_SYMMETRIC = 1e-6  # sine of the angle of a rotation
 
 def rotations(angles: np.ndarray) -> np.ndarray:
     """Return R = Rz(yaw) Ry(pitch) Rx(roll) of angles (..., 3) [rad], (..., 3, 3) [-]."""
-    (sr, sp, sy), (cr, cp, cy) = np.moveaxis(np.sin(angles), -1, 0), np.moveaxis(np.cos(angles), -1, 0)
+    (sr, sp, sy), (cr, cp, cy) = ([part[..., k] for k in range(3)] for part in (np.sin(angles), np.cos(angles)))
     R = np.empty((*angles.shape[:-1], 3, 3))
     R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
     R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr

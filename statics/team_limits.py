@@ -1,4 +1,4 @@
-"""What a motion of flying carriers requires of their actuators, cables and winches: `limits_of`, `worst_of`."""
+"""What motions of flying carriers require of actuators, cables and winches: `limits_of`, `excess_of`, `worst_of`."""
 
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -64,8 +64,8 @@ def pull_of(robot: Robot, forces: np.ndarray) -> np.ndarray:
     return -(carriers_of(robot).holds @ forces)
 
 
-def worst_of(rows: list[Row], times: np.ndarray, begins_inside: bool = True) -> list[tuple[float, str]]:
-    """Return the largest excess of each stop, relative to a limit's range, and the text of that limit.
+def excess_of(rows: list[Row], begins_inside: bool = True) -> np.ndarray:
+    """Return how far limits are exceeded, (k, d, n), relative to their ranges; accepted excess is none.
 
     Unless a stop should begin inside, so much as it has first is no excess. What is undefined is infinitely much.
     """
@@ -74,15 +74,18 @@ def worst_of(rows: list[Row], times: np.ndarray, begins_inside: bool = True) -> 
     floor = low if begins_inside else np.minimum(low, values[..., :1])
     ceiling = high if begins_inside else np.maximum(high, values[..., :1])
     beyond = np.where(np.isnan(values), np.inf, np.maximum(floor - values, values - ceiling) / _range(low, high))
-    beyond = np.where(beyond > accepted, beyond, 0.0)
-    worst = [(0.0, "")] * len(times)
-    for d, excess in enumerate(beyond.max(axis=(0, 2)).tolist()):
-        if excess > 0:
-            k, at = np.unravel_index(np.argmax(beyond[:, d]), beyond[:, d].shape)
-            value = values[k, d, at]
-            bound = float(low[k, 0, 0] if value < low[k, 0, 0] else high[k, 0, 0])
-            worst[d] = excess, f"{rows[k].name}: {quantity(value)} of {bound:g} at {quantity(times[d, at], 's')}"
-    return worst
+    return np.where(beyond > accepted, beyond, 0.0)
+
+
+def worst_of(rows: list[Row], times: np.ndarray) -> tuple[float, str]:
+    """Return the largest excess of one stop, at times (n,), and the text of that limit; empty if there is none."""
+    excess = excess_of(rows)[:, 0]
+    k, at = np.unravel_index(np.argmax(excess), excess.shape)
+    if excess[k, at] == 0:
+        return 0.0, ""
+    row, value = rows[k], rows[k].values[0, at]
+    bound = row.low if value < row.low else row.high
+    return float(excess[k, at]), f"{row.name}: {quantity(value)} of {bound:g} at {quantity(times[at], 's')}"
 
 
 def _range(low: Any, high: Any) -> Any:
@@ -130,7 +133,7 @@ def limits_of(
         wrench, name, own = wrenches[:, :, k], carrier.name, carrier.motion_limits
         commands = wrench @ its.commands[k]
         rows += [Row(f"{a.name} of {name}", commands[..., i], a.low, a.high) for i, a in enumerate(its.actuators[k])]
-        if limits_lacking and carrier.actuators and its.anchors[k].any():
+        if limits_lacking and its.actuators[k] and its.anchors[k].any():
             given = commands @ np.array([a.wrench for a in its.actuators[k]])
             lacking = np.linalg.norm((wrench - given)[..., :3], axis=-1)
             most = max(robot.t_min[its.first[k]], LACKING * robot.t_max[its.first[k]])

@@ -23,17 +23,16 @@ from ..models.dynamics import dynamics_of
 from ..models.robot import Robot
 from ..models.trajectory import Motion, Trajectory
 from .continuation import RESTS, before, continued, faded, slopes
-from .team_limits import carriers_of, limits_of, pull_of, worst_of
+from .team_limits import carriers_of, excess_of, limits_of, pull_of, worst_of
 from .winch_forces import forces_of_winches, has_winches
 
 SHORTEST, LONGEST = 0.1, 10.0  # the shortest stop [s], and the longest one over a usual one
-ATTEMPTS, USUAL = 8, 2.5  # durations that are tried, all at once, and a usual one, of sqrt(length / g)
+ATTEMPTS, USUAL = 12, 2.5  # durations that are tried, all at once, and a usual one, of sqrt(length / g)
 CLOSE = 1.5  # times the least excess: of stops that break limits, the shortest with less is taken
 LEAST = 1.7  # times that carriers need at their largest acceleration: the rate falls up to 2.2 times its mean
 COARSE, FINE, APART = 24, 150, 0.01  # instants of an attempt, and at most of the result; [s] between those, at least
 SMOOTHED = 0.03  # [s], over which tilt is smoothed: a plan's jerk jumps between its nodes
-LONGER, AGAIN = 1.03, 3  # at least, and how often: what broke a limit in between takes longer
-LITTLE = 0.03  # of a limit's range: what breaks it by more takes the next duration that was tried
+LONGER, AGAIN = 1.03, 4  # at least, then its third and ninth power, and how often: what broke a limit takes longer
 TINY, RANK = 1e-12, 1e-9  # of a matrix
 TILTS = 3  # times that positions are computed from tilts, which follow from accelerations
 INSTANT = 1e-4  # [s], for differences of attitudes
@@ -59,7 +58,7 @@ class TeamStop(NamedTuple):
 def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> TeamStop:
     """Return the shortest stop inside the limits that is found, or the shortest that breaks them nearly the least.
 
-    A plan that ends at rest is followed to its end if no stop is shorter.
+    A plan that ends at rest is followed to its end if no shorter stop is found inside the limits, or breaks them less.
 
     Raises `InputError` if the flying carriers of the robot have several cables that do not give every wrench at home,
     or several of fixed length that begin at different points of a carrier.
@@ -80,26 +79,28 @@ def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Team
     soonest = max(SHORTEST, LEAST * float(braking.max()))
     longest_cable = dynamics_of(robot).cable_lengths(robot.home, robot.carrier_home).max()
     usual = USUAL * np.sqrt(longest_cable / np.linalg.norm(robot.gravity))
-    longest = min(LONGEST * max(usual, soonest), max(2 * left, soonest))
-    durations = np.geomspace(soonest, longest, ATTEMPTS)
-    durations, best = durations[durations < left], None
-    if len(durations):
-        excess = np.array([each for each, _ in _Stops(robot, trajectory, begins, durations, COARSE).worst])
+    longest = min(LONGEST * max(usual, soonest), max(left, soonest))
+    durations = np.geomspace(soonest, longest, ATTEMPTS, endpoint=not rests)
+    durations = durations[durations < left]  # none if the plan rests sooner; only the soonest without gravity
+    excess = _Stops(robot, trajectory, begins, durations, COARSE).excess if len(durations) else durations
+    within = bool((excess == 0).any())
+    found = [_remainder(robot, trajectory, begins)] if rests and not within else []
+    if len(durations) and not (found and found[0].excess == 0):
         kept = durations[excess <= CLOSE * excess.min()]
         duration = float(kept[0])
         # With more instants more is exceeded: where no attempt keeps the limits, the result does not either.
-        for tried in range(AGAIN if excess.min() == 0 else not rests):
+        for again in range(AGAIN if within else 1):
             count = int(np.clip(duration / APART, 10, FINE))
-            found = _Stops(robot, trajectory, begins, np.array([duration]), count).only()
-            best = found if best is None or found.excess < best.excess else best
-            after = kept[kept > duration]
-            if len(after) and (tried or found.excess > LITTLE):
-                duration = float(after[0])
-            else:
-                duration *= max(np.sqrt(1.0 + found.excess), LONGER)  # accelerations are as its inverse square
-            if best.excess == 0 or duration >= min(left, longest):
+            found.append(_Stops(robot, trajectory, begins, np.array([duration]), count).only())
+            # Accelerations are as its inverse square.
+            longer = duration * max(np.sqrt(1.0 + found[-1].excess), LONGER ** (3**again))
+            after = [*kept[kept > (longer if again else duration)].tolist(), longer]
+            duration = after[0] if again else min(after[0], longer)
+            if found[-1].excess == 0 or duration >= longest:
                 break
-    return _remainder(robot, trajectory, begins) if best is None or (rests and best.excess > 0) else best
+        if rests and within and found[-1].excess > 0:
+            found.append(_remainder(robot, trajectory, begins))
+    return min(found, key=lambda its: its.excess)
 
 
 def _have_one_each(robot: Robot) -> bool:
@@ -131,7 +132,7 @@ def _remainder(robot: Robot, trajectory: Trajectory, begins: float) -> TeamStop:
     turning = R, (after - before) / (2 * INSTANT), (after - 2 * R + before) / INSTANT**2
     windings = _windings(robot, times[None], platform[0][None], pose, tensions[None])
     rows = limits_of(robot, motion, forces[None], tensions[None], turning, windings)  # type: ignore[arg-type]
-    return TeamStop(times, begins + times, platform, carriers, tensions, *worst_of(rows, times[None])[0])
+    return TeamStop(times, begins + times, platform, carriers, tensions, *worst_of(rows, times))
 
 
 def _windings(
@@ -187,7 +188,7 @@ class _Stops:
         turning = R, self._slope(R), self._slope(self._slope(R))
         windings = _windings(robot, self.times, self.platform[0], self.carriers[0], self.tensions)
         rows = limits_of(robot, self.carriers, self._forces, self.tensions, turning, windings, limits_lacking=True)
-        self.worst = worst_of(rows, self.times, begins_inside=False)
+        self._rows, self.excess = rows, excess_of(rows, begins_inside=False).max(axis=(0, 2))  # of each stop, (d,)
 
     def _balance(self, carriers: np.ndarray | None = None) -> np.ndarray:
         """Find forces and tensions, with carriers (d, n, c, 6), or those of the plan; return the plan's forces."""
@@ -258,9 +259,10 @@ class _Stops:
         return values
 
     def only(self) -> TeamStop:
-        """Return the only stop."""
+        """Return the only stop; if it breaks limits, with what it breaks at its beginning, as the plan does."""
         platform, carriers = (tuple(part[0] for part in motion) for motion in (self.platform, self.carriers))
-        return TeamStop(self.times[0], self.tau[0], platform, carriers, self.tensions[0], *self.worst[0])  # type: ignore[arg-type]
+        worst = worst_of(self._rows, self.times[0]) if self.excess[0] > 0 else (0.0, "")
+        return TeamStop(self.times[0], self.tau[0], platform, carriers, self.tensions[0], *worst)  # type: ignore[arg-type]
 
 
 def _forces(

@@ -62,7 +62,7 @@ def test_stops_of_teams_obey_the_equations_of_motion(made):
 def test_a_team_stops_in_a_simulation(made):
     robot, found = made
     its = stop(found, 0.4 * found.duration)
-    assert its.duration < 0.55 * found.duration
+    assert its.duration < 0.75 * (found.duration - its.begins)  # durations up to what is left are tried closely
     flown = simulate(robot, its, Predictive(robot), duration=its.duration + 0.3, period=2e-3)
     assert flown.passed
     assert flown.error.max() < 0.01
@@ -162,6 +162,10 @@ def test_a_stop_that_cables_are_too_weak_for_takes_no_half_minute(made):
     its = team_stop_along(weak, planned(found.trajectory.sel(time=slice(0.0, 1.2)))[1], 1.0)
     assert its.limit.startswith("tension ")
     assert its.times[-1] < 20 * np.sqrt(robot.fixed_lengths.max() / 9.81)
+    # The rest of the plan, which breaks this limit more, is not followed instead.
+    its, rest = team_stop_along(weak, planned(found)[1], 1.5), found.trajectory.sel(time=slice(1.5, None)).tensions
+    assert its.excess == pytest.approx(((its.tensions - weak.t_max) / (weak.t_max - weak.t_min)).max(), rel=1e-6)
+    assert its.excess < 0.9 * ((rest.values - weak.t_max) / (weak.t_max - weak.t_min)).max()
 
 
 def test_the_rest_of_a_plan_for_stronger_cables_is_no_feasible_stop(made):
