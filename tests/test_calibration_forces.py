@@ -394,7 +394,7 @@ def test_stretch_of_cables_is_found_by_the_weight_that_hangs_from_them():
     timeless = log.changed(times=None)
     with pytest.raises(InputError, match="times must be given to estimate elasticity, got none, and the poses look"):
         calibrate(robot, timeless, free=("anchors", "offsets", "elasticity"))
-    assert "a motion without times: stretch of the cables was not sought" in str(calibrate(robot, timeless).report())
+    assert "a motion without times, so stretch of the cables was not sought" in str(calibrate(robot, timeless).report())
     stiff = robot.model_copy(
         update={"cables": tuple(one.model_copy(update={"stiffness": 1e5}) for one in robot.cables)}
     )
