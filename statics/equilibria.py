@@ -66,7 +66,7 @@ class Equilibrium(Displayed):
         """Return some of several equilibria."""
         return Equilibrium(*(value[which] for value in vars(self).values()))
 
-    def put(self, which: int, other: "Equilibrium") -> None:
+    def put(self, which: Any, other: "Equilibrium") -> None:
         """Replace one of several equilibria."""
         for name, value in vars(other).items():
             getattr(self, name)[which] = value

@@ -517,3 +517,17 @@ def test_cables_without_tension_are_left_out():
     for poses in (None, np.zeros((8, 6))):
         log = Measurements(np.full((8, 4), 3.0), poses, tensions=pull)
         np.testing.assert_array_equal(slack(as_robot(file), log), expected)
+
+
+def test_thrusts_of_a_carrier_whose_cable_never_pulls_do_not_hide_the_mass():
+    """Such thrusts carry the carrier alone: their error relative to the tension, which is 0, was infinite."""
+    robot, draw = load("multi-quadrotor-4"), np.random.default_rng(0)
+    poses = robot.home + 0.05 * draw.uniform(-1, 1, (60, 6))
+    A, w = Dynamics(robot).wrench_matrix(poses), Dynamics(robot).required_wrench(poses, np.zeros(6), np.zeros(6))
+    pulls = [0, 2, 3]
+    tensions = np.zeros((60, 4))
+    tensions[:, pulls] = np.linalg.solve(A[:, :3, pulls], w[:, :3, None])[..., 0]
+    carriers = np.tile(robot.carrier_home, (60, 1, 1))
+    log = Measurements(Dynamics(robot).cable_lengths(poses), poses, tensions=np.abs(tensions), carrier_poses=carriers)
+    found = calibrate(robot, log, free=("mass",))
+    assert 1e-3 < np.sqrt(found.covariance[0, 0]) / robot.platform.mass < 0.05

@@ -16,6 +16,7 @@ from .parameters import COLUMNS, GROUPS, IN_BALANCE, OF_CABLE, Parameters
 
 ENDS = ("anchors", "attachments")
 OF_THRUSTS = 0.005  # error of thrusts, up to which `thrust_gains` leaves them as they are
+SLACK = 1e-6  # of a carrier's weight
 ACCURATE, ACCURATELY = 0.005, 0.001  # [m], and share of the cables' length: errors of cable ends in files
 
 
@@ -33,9 +34,8 @@ def considered(model: Model, state: State, inverse: np.ndarray) -> np.ndarray:
     """Return the covariance that errors of fixed cable ends add, (p, p), in the order and units of the parameters.
 
     These errors are those of the file's `uncertainty`, or the usual ones of ends that it does not contain, and those of
-    thrusts from which tensions were computed. The result
-    is zero except for parameters of the balance of forces: the geometry is estimated relative to the ends that are
-    fixed, but masses and forces are not relative to anything.
+    thrusts from which tensions were computed. The result is zero except for parameters of the balance of forces: the
+    geometry is estimated relative to the ends that are fixed, but masses and forces are not relative to anything.
 
     - `inverse`: pseudo-inverse of the normal matrix of the free parameters, in metres, (p, p).
     """
@@ -61,7 +61,8 @@ def considered(model: Model, state: State, inverse: np.ndarray) -> np.ndarray:
         masses = np.array([carrier.body.mass if carrier.body else 0.0 for carrier in of.robot.carriers])
         weights = masses[of.robot.carrier_of_cable] * np.linalg.norm(of.robot.gravity)  # which thrusts carry, too
         gains = OF_CABLE * np.arange(of.robot.m) + COLUMNS["gains"][0]
-        errors[gains, gains] = (OF_THRUSTS * (1 + weights / tensions)) ** 2
+        pulls = tensions > SLACK * weights  # gains of others have no effect
+        errors[gains, gains] = (OF_THRUSTS * (1 + np.divide(weights, tensions, out=0 * weights, where=pulls))) ** 2
     errors = errors[np.ix_(every[~free], every[~free])]
     scale = metric(model)
     S = NormalEquations.at(whole, state, scale).S
