@@ -68,7 +68,7 @@ class PlanData(Displayed):
         iterates: Rows of (iteration, objective, infeasibility) of all runs of the solver, in order; each run starts at
             0.
         stages: The stages of the planner, in order, with their messages and times.
-        objective: Final value of the solver's objective; None if no program was solved.
+        objective: Final value of the task's objective in the program; None if no program has it.
         robust: Tension spread due to geometric uncertainty; None unless the task requires it.
         stop: The longest stop on the path from an instant of the plan; None unless the task has `stop_within`.
         offers: Computes `relaxations`.

@@ -341,7 +341,7 @@ class Search:
             iterations=outcome.iterations,
             message=outcome.message,
             iterates=tuple(self._iterates),
-            objective=outcome.objective,
+            objective=None if np.isnan(outcome.objective) else outcome.objective,  # of the elastic program
         )
 
     def audit_motion(self, scenario: Scenario, deviation: Deviation | None, name: str = "audit") -> Audit:
