@@ -22,6 +22,9 @@ from .recorded import motion, stamp
 from .warm import towline
 
 NAMES = [f"cable{i + 1}_dir_{axis}" for i in range(2) for axis in "xyz"]
+OF_THRUSTS = 0.005 * np.hypot(
+    0.6 + 0.2, 0.65 + 0.2
+)  # error of the mass [kg] if thrusts are 0.5 % wrong: drone, half load
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +47,7 @@ def test_a_team_from_log_to_replay(recorded, robot, tmp_path):
     values = {one["name"]: one for one in told["parameters"]}
     for name, truth in (("cables[0].offset", 0.02), ("cables[1].offset", -0.01), ("mass", 0.4)):
         assert abs(values[name]["value"] - truth) < 4 * values[name]["sigma"] + 1e-5
-        assert values[name]["sigma"] < 1e-3
+        assert values[name]["sigma"] < (1e-3 if "offset" in name else 1.2 * OF_THRUSTS)
     sigma = ("--sigma", "lengths=0.0005,directions=0.01")
     towline("pose", "team-calibrated.yaml", "--log", "flight.csv", *sigma, cwd=tmp_path)
     poses = np.loadtxt(tmp_path / "flight-poses.csv", delimiter=",", skiprows=1)
@@ -87,7 +90,7 @@ def test_a_load_that_no_camera_sees_is_not_at_rest(recorded, robot, tmp_path):
     found = {one["name"]: one for one in calibrate(robot, read, ("offsets", "mass")).to_dict()["parameters"]}
     for name, truth in (("cables[0].offset", 0.02), ("cables[1].offset", -0.01), ("mass", 0.4)):
         assert abs(found[name]["value"] - truth) < 4 * found[name]["sigma"]
-    assert found["mass"]["sigma"] < 0.005
+    assert found["mass"]["sigma"] == pytest.approx(OF_THRUSTS, rel=0.2)
 
 
 def test_angles_from_straight_down(recorded, robot, tmp_path):

@@ -400,3 +400,14 @@ def test_scales_that_explain_errors_that_repeat_are_estimated_too():
     assert np.abs(result.robot.anchors - built.robot.anchors).max() < 4e-3
     scales = np.array([one.value for one in result.parameters if one.name.endswith("scale")])
     np.testing.assert_allclose(scales, 1.02, atol=5e-4)
+
+
+def test_offsets_are_as_uncertain_as_the_anchors_that_are_kept():
+    """Ends of cables that a file has wrong by its usual 5 mm spoil offsets, which more samples do not tell."""
+    squares = []
+    for seed in range(10):
+        built = as_built(12, seed, noise=1e-4, anchors=5e-3)
+        result = calibrate("cogiro", Measurements(built.readings, built.poses), ["offsets"], outliers=False)
+        off = np.array([one.value for one in result.parameters]) - built.offsets
+        squares.append(off @ np.linalg.solve(result.covariance, off) / len(off))
+    assert 0.6 < np.mean(squares) < 1.5

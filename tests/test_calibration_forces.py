@@ -93,11 +93,14 @@ def drawn(com=COM):
 def test_four_cables_calibrate_without_a_camera():
     """Lengths up to offsets, an inertial sensor and tensions: poses to 10 mm, and a CoM 30 mm off to 3 mm."""
     ratios, errors, wrong_com = [], [], COM + 0.03 * np.array([0.6, -0.64, 0.48])
+    names = [f"cables[{i}].{end}.{axis}" for i in range(4) for end in ("anchor", "attachment") for axis in "xyz"]
+    exact = {"parameters": names, "covariance": (1e-12 * np.eye(24)).tolist()}  # as the ends of its cables are
+    file = Robot.model_validate(drawn(wrong_com).model_dump() | {"uncertainty": exact})
     for seed in range(2):
         poses, readings, angles, tensions, offsets = rests(seed)
         sigma = {"lengths": 1e-3, "rotation": AHRS, "tensions": 0.02}
         log = Measurements(readings, orientations=angles, tensions=tensions, sigma=sigma)
-        result = calibrate(drawn(wrong_com), log, ("offsets", "com"))
+        result = calibrate(file, log, ("offsets", "com"))
         assert result.converged
         assert not result.not_identifiable
         assert np.sqrt(((result.poses - poses)[:, :3] ** 2).sum(axis=1).mean()) < 0.01

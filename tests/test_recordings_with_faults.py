@@ -52,6 +52,18 @@ def test_a_stuck_encoder_spoils_no_anchor(part):
         np.testing.assert_array_equal(result.robot.anchors[2], robot.anchors[2])
 
 
+def test_winches_locked_at_several_settings_are_no_stuck_encoders():
+    """Who pushes the platform makes cables slack by decimetres; encoders that all stop during a motion are stuck."""
+    robot, poses, y, _ = a_motion()
+    of_setting = np.repeat(np.arange(8), 50)
+    for rows, stuck in ((of_setting >= 0, False), (of_setting == 3, True)):
+        held = np.where(rows[:, None], y[50 * of_setting], y)
+        left = left_out(robot, Measurements(held, poses, times=TIMES))
+        found = left["encoders that stand still while their cables move"]
+        assert found.any() == stuck
+        assert not found[~rows].any()
+
+
 def test_counters_that_begin_again():
     times = np.linspace(0, 9, 400)
     whole = np.stack([40_000 * np.sin(times), 70_000 * np.cos(times), 900 * times], axis=1).round()

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from towline import InputError, Measurements, load, read_measurements
 from towline.estimation.calibration import attitudes, calibrate
+from towline.estimation.calibration.geometry import length_of
 from towline.estimation.calibration.plausibility import mistake
 from towline.estimation.calibration.solving import usual
 from towline.estimation.logs import read_log
@@ -80,9 +81,12 @@ def test_locked_winches_and_poses_in_two_files(tmp_path):
         user.write(tmp_path / f"camera{ahead:g}.csv", [head[0], *head[5:]], seen, form="%.12g")
     read = read_measurements(tmp_path / "winches.csv", poses=tmp_path / "camera0.3.csv", robot=robot)
     np.testing.assert_allclose(read.poses[:, :3], 1e-3 * table[: len(read), 5:8], atol=1e-9)
-    for free, kept in (("anchors", "offsets"), ("offsets", "anchors")):
-        said = calibrate(robot, read, [free]).report()
-        assert f"hold only if the file's {kept} are exact; with --free anchors,offsets --prior {kept}=0.02" in said
+    held = ("hold only if the file's offsets are exact", "of the file's anchors")
+    for free, kept, why in (("anchors", "offsets", held[0]), ("offsets", "anchors", held[1])):
+        result = calibrate(robot, read, [free])
+        assert f"{why}; with --free anchors,offsets --prior {kept}=0.02 they include errors of 20 mm" in result.report()
+    along = 1e-3 * length_of(load(robot))  # error of each coordinate of an anchor, so also of that along the cable
+    np.testing.assert_allclose([one.sigma for one in result.parameters], along, rtol=0.05)
     with pytest.raises(InputError, match="lengths must change to align the clocks, got readings of locked winches"):
         read_measurements(tmp_path / "winches.csv", poses=tmp_path / "camera1e+06.csv", robot=robot)
 
@@ -98,7 +102,7 @@ def test_rests_with_an_ahrs_and_load_cells(tmp_path):
         value, sigma = values[f"cables[{i}].offset"]
         assert abs(value - offsets[i]) < 4 * sigma
         assert sigma < 6e-3
-    exact = "hold only if the file's anchors are exact; with --free anchors,offsets --prior anchors=0.02 they include"
+    exact = "of the file's anchors; with --free anchors,offsets --prior anchors=0.02 they include errors of 20 mm"
     text = (tmp_path / robot).read_text()
     for uncertain in ("", "uncertainty: {parameters: ['cables[0].anchor.x'], covariance: [[1.0e-4]]}\n"):
         (tmp_path / "uncertain.yaml").write_text(text + uncertain)

@@ -1,4 +1,4 @@
-"""`considered`: what errors of cable ends that a fit takes as exact do to mass, CoM, friction, gains and zeros.
+"""`considered`: what errors of cable ends that a fit takes as exact do to its parameters.
 
 Parameters f are fitted with the ends c of the file. With the normal matrix S of both, an error of the ends moves the
 fit by -S_ff^-1 S_fc dc, whose covariance is added to that of the readings' noise (consider covariance, Schmidt 1966).
@@ -34,20 +34,20 @@ def considered(model: Model, state: State, inverse: np.ndarray) -> np.ndarray:
     """Return the covariance that errors of fixed cable ends add, (p, p), in the order and units of the parameters.
 
     These errors are those of the file's `uncertainty`, or the usual ones of ends that it does not contain, and those of
-    thrusts from which tensions were computed. The result is zero except for parameters of the balance of forces: the
-    geometry is estimated relative to the ends that are fixed, but masses and forces are not relative to anything.
+    thrusts from which tensions were computed. For parameters of the geometry only errors of anchors that stand count:
+    it is estimated relative to the attachments, but forces are not relative to anything.
 
     - `inverse`: pseudo-inverse of the normal matrix of the free parameters, in metres, (p, p).
     """
     of, uncertain = model.parameters, model.robot.uncertainty
     varies, in_balance = np.flatnonzero(of.varies), Parameters(model.robot, IN_BALANCE).varies
-    own = in_balance[varies[varies < len(in_balance)]]
-    own = np.pad(own, (0, len(varies) - len(own)))  # slips are last
-    result = np.zeros((len(varies), len(varies)))
+    of_forces = in_balance[varies[varies < len(in_balance)]]
+    of_forces = np.pad(of_forces, (0, len(varies) - len(of_forces)))  # slips are last
     thrusts = ("gains",) if from_thrusts(of.robot) and model.measurements.tensions is not None else ()
     groups = tuple(name for name in GROUPS if name in (*of.groups, *ENDS, *thrusts))
-    if not own.any() or groups == of.groups:
-        return result
+    stand = model.measurements.carrier_poses is None  # else measurements tell where anchors are, nearly alone
+    if groups == of.groups or not (of_forces.any() or (stand and "anchors" not in of.groups)):
+        return np.zeros((len(varies), len(varies)))
     whole = replace(model, parameters=replace(of, groups=groups))
     every = np.flatnonzero(whole.parameters.varies)
     free = np.isin(every, varies)
@@ -66,6 +66,7 @@ def considered(model: Model, state: State, inverse: np.ndarray) -> np.ndarray:
     errors = errors[np.ix_(every[~free], every[~free])]
     scale = metric(model)
     S = NormalEquations.at(whole, state, scale).S
-    moved = (inverse @ S[np.ix_(free, ~free)])[own] / scale[varies[own], None]
-    result[np.ix_(own, own)] = moved @ errors @ moved.T
-    return result
+    moved = (inverse @ S[np.ix_(free, ~free)]) / scale[varies, None]
+    anchors = Parameters(model.robot, ENDS[:1]).varies[every[~free]]
+    moved[np.ix_(~of_forces, ~(anchors & stand))] = 0.0
+    return moved @ errors @ moved.T

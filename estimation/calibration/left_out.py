@@ -42,12 +42,12 @@ def _still(robot: Robot, measurements: Measurements) -> np.ndarray:
     """Return which readings stay the same although poses show that the cable's length changes, (N, m) of bool.
 
     It must change by more than displaced ends of cables explain; without poses, all other readings must. Winches that
-    are all locked hold still themselves.
+    are all locked for most of the log hold still themselves.
     """
     y, known = measurements.lengths, tracked(robot, measurements)
     rows, result = np.flatnonzero(known if known.any() else ~known), np.zeros(y.shape, dtype=bool)
     same = np.abs(np.diff(y[rows], axis=0)) <= SAME * np.abs(y).max(axis=0)
-    if not same.any() or same.all():
+    if not same.any() or same.all(axis=1).mean() > MOST_SLACK:
         return result
     parameters = Parameters(robot, ())
     lengths = parameters.table(parameters.first)[:, 7] * y[rows]

@@ -11,6 +11,7 @@ from ...figures.report import Part, Report, Section, Table
 from ...models.parsing import to_yaml
 from .balance import hangs
 from .clock import is_still
+from .considered import usual_error
 from .file_errors import ENDS
 from .geometry import length_of
 from .hanging import slack
@@ -144,9 +145,13 @@ def _of_noise(result: CalibrationData) -> list[str]:
     if still or (kept[:1] == ["anchors"] and not set(result.free) <= {*IN_BALANCE} and not known):
         why = "the lengths hardly change, so they do not distinguish offsets from anchors: " * still
         free = ",".join(name for name in GROUPS if name in (kept[0], *result.free))
+        held = f"hold only if the file's {kept[0]} are exact"
+        if kept[0] == "anchors" and result.measurements.carrier_poses is None:
+            size = "" if known else f" of {_mm(usual_error(result._solved.model))}"
+            held = f"include errors{size} of the file's anchors"
         lines.append(
-            f"{why}the standard deviations below hold only if the file's {kept[0]} are exact; with --free {free} "
-            f"--prior {kept[0]}=0.02 they include errors of 20 mm"
+            f"{why}the standard deviations below {held}; with --free {free} --prior {kept[0]}=0.02 they include errors "
+            "of 20 mm"
         )
     if result.growth is not None:
         free = ",".join(name for name in GROUPS if name in ("scales", *result.free))

@@ -394,7 +394,7 @@ def inflation_of(noise: Noise) -> float:
 def covariance_of(solved: Solved) -> np.ndarray:
     """Return the covariance of the parameters, (p, p), in their order and units [m, 1, s].
 
-    The covariance of mass, CoM, friction, gains and zeros includes errors of cable ends that are fixed.
+    It includes errors of anchors that are fixed, and in parameters of forces errors of all fixed ends (`considered`).
     """
     scale = metric(solved.model)[solved.model.parameters.varies]
     covariance = solved.noise.covariance / scale[:, None] / scale
