@@ -30,8 +30,9 @@ FixOption = Annotated[
 def log(logs: list[Path], fields: FieldsOption = None, robot: str | None = None, as_json: JsonOption = False) -> None:
     """List what logs contain (topics, rates, gaps, fields, units), which fields towline uses, and what for.
 
-    The exit code is 1 if the logs contain no cable lengths and therefore cannot be used. For a robot with cables of
-    fixed length (--robot), positions of the platform or directions of the cables suffice.
+    The exit code is 1 if the logs cannot be used because they contain no cable lengths, or because the lengths of some
+    cables are missing in more than a fifth of the lines. For a robot with cables of fixed length (--robot), positions
+    of the platform or directions of the cables suffice.
     """
     from ..estimation.logs import read_map, recordings
     from ..estimation.logs.listing import listing, report

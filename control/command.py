@@ -19,12 +19,13 @@ class Command(NamedTuple):
         tensions: (..., m) [N], inside their limits and rate limits; small for a cable that is treated as cut.
         carrier_pose, carrier_velocity, carrier_acceleration: Commanded motion of the carriers, (..., c, 6). Flying
             carriers follow `actuation` instead.
-        answered: (...), status of the step, an index of `ANSWERS`. "as planned": the tensions give the required wrench;
-            "shifted plan": they are from an earlier solution; "soft wrench": they have the closest wrench; "hold": the
-            last command is held; "not as modelled": computed torque took over, because the robot does not move as
-            predicted; "off the reference": the tensions give the required wrench, but the platform is farther away from
-            its reference than a simulation passes with by default (0.05 m, or 5 % of the mean cable length if that is
-            less), or turned by more than 0.5 rad.
+        answered: (...), status of the step, an index of `ANSWERS`. "as planned": the tensions give the required
+            wrench; "shifted plan": they are from an earlier solution; "soft wrench": they have the closest wrench;
+            "hold": the measured state or the reference contained nan, so the command moves to the planned tensions;
+            "not as modelled": computed torque took over, because the robot does not move as predicted; "off the
+            reference": the tensions give the required wrench, but the platform is farther away from its reference than
+            a simulation passes with by default (0.05 m, or 5 % of the mean cable length if that is less), or turned by
+            more than 0.5 rad.
         direction, shortfall: If no tensions inside the limits and rates give the required wrench: the direction of the
             missing wrench, (..., 6), and its size [N], (...); otherwise nan (default). If tensions exist but a flying
             carrier has too little thrust for them, or does not turn as commanded because its actuators were at their

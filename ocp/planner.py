@@ -176,7 +176,7 @@ class Planner(Displayed):
         The new plan starts with the measured pose and velocity of the platform, and of carriers that the planner moves.
         Its path is the remainder of the task's path plus the current tracking error, which decays to zero within
         `settle`. If the state contains tensions, the plan starts with them and the acceleration that they cause;
-        otherwise with the acceleration of the last plan. Time 0 of the new plan is `time` of the whole motion.
+        otherwise with the tensions of the last plan. Time 0 of the new plan is `time` of the whole motion.
 
         Args:
             state: A `control.State`, or an `Initial` or a mapping with its keys.

@@ -52,5 +52,6 @@ def read_wind(robot: Robot, wind: Any, gusts: float) -> Wind | None:
     except (TypeError, ValueError, OverflowError):
         velocity = np.empty(0)
     if velocity.shape != (3,) or not (np.abs(velocity) <= 1e3).all():
-        raise InputError(f"wind must be three numbers from -1000 to 1000 m/s or a function of times, got {shown(wind)}")
+        accepted = "three numbers from -1000 to 1000 m/s or a function of times and a seed"
+        raise InputError(f"wind must be {accepted}, got {shown(wind)}")
     return MeanWind(velocity, gusts)

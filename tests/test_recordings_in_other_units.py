@@ -1,16 +1,18 @@
 """Recordings of drum angles, of drones in north, east, down, and of locked winches, through the command line."""
 
 import json
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from towline import Dynamics, load, read_measurements
+from towline import Dynamics, InputError, load, read_measurements
 from towline.estimation.calibration import Measurements, calibrate
 from towline.estimation.calibration.correction import correction_of
 from towline.estimation.calibration.plausibility import mistake
-from towline.estimation.logs import read_log
+from towline.estimation.logs import read_log, recordings
+from towline.estimation.logs.listing import listing
 from towline.estimation.logs.measurements import measured_poses
 from towline.estimation.logs.names import role, time_unit
 from towline.estimation.logs.tables import from_csv
@@ -320,9 +322,26 @@ def test_the_title_of_a_sheet_is_no_part_of_the_names(tmp_path):
 
 def test_lines_without_a_value_are_listed(tmp_path):
     (tmp_path / "log.csv").write_text("t,l1,l2\n0,1,1\n0.1,,1\n0.2,1,1\n")
-    told = json.loads(towline("log", "log.csv", "--json", cwd=tmp_path).stdout)
+    told = json.loads(towline("log", "log.csv", "--json", code=1, cwd=tmp_path).stdout)
     assert told["files"][0]["topics"][0]["empty"] == {"lengths": 1}
-    assert "lines without lengths: 1" in towline("log", "log.csv", cwd=tmp_path).stdout
+    assert "lines without lengths: 1" in towline("log", "log.csv", code=1, cwd=tmp_path).stdout
+
+
+@pytest.mark.parametrize(
+    ("rows", "missing"),
+    [
+        ("0,1,1\n0.1,,1\n0.2,1,1\n", "lengths in 1 of 3 lines"),
+        ("0,1,1\n0.1,,\n0.2,1,1\n", None),  # a line of another sensor
+        ("0,1,1\n0.1,,1\n0.2,1,1\n0.3,1,1\n0.4,1,1\n", None),
+        ("0,,1\n0.1,,1\n0.2,1,\n", "lengths in 3 of 3 lines"),
+    ],
+)
+def test_a_table_is_of_use_as_far_as_it_can_be_read(tmp_path, rows, missing):
+    """More than a fifth of the lines lack some of the lengths: `read_measurements` refuses the table."""
+    (tmp_path / "log.csv").write_text("t,l1,l2\n" + rows)
+    assert listing(recordings(tmp_path / "log.csv"))["uses"]["calibration without poses"] == missing
+    with nullcontext() if missing is None else pytest.raises(InputError, match="must be a finite number"):
+        read_measurements(tmp_path / "log.csv")
 
 
 @pytest.mark.parametrize("turn", [0.002, 0.2])

@@ -11,6 +11,7 @@ from ...figures.report import Part, Report, Section, Table
 from ...models.robot import Robot
 from .mapping import Fields, LogMap, carrier_fields, command_fields, fields_of, free_axes
 from .names import UNITS, time_unit
+from .reading import are_too_partial, of_two_sensors
 from .recording import GAP, Recording, Topic, plain
 from .replay_needs import missing_for_replay
 
@@ -88,7 +89,7 @@ def _uses(found: Fields, commands: Fields, robot: Robot | None, placed: Sequence
     fixed = robot is not None and robot.fixed_lengths is not None  # cables of fixed length have no readings
     first = found.lengths or ((found.position or found.directions) if fixed else ())
     timed = bool(first) and (first[0].topic.times is not None or any(one.topic is first[0].topic for one in found.time))
-    no_lengths = None if first else "lengths"
+    no_lengths = _missing_lengths(found) if first else "lengths"
     poses = bool(found.position or found.orientation)
     return {
         "calibration with poses": no_lengths or (None if poses else "poses (or give another file with --poses)"),
@@ -96,6 +97,20 @@ def _uses(found: Fields, commands: Fields, robot: Robot | None, placed: Sequence
         "pose from lengths": no_lengths,
         "replay": no_lengths or missing_for_replay(found, commands, timed, robot, placed),
     }
+
+
+def _missing_lengths(found: Fields) -> str | None:
+    """Return in how many lines of a table lengths are missing, if these are too many to read it; otherwise None."""
+    topic = found.lengths[0].topic if found.lengths else None
+    if topic is None or topic.times is not None or any(one.topic is not topic for one in found.lengths):
+        return None  # messages
+    lengths = topic.read([one.name for one in found.lengths]).values
+    pose, finite = found.position or found.orientation, np.isfinite(lengths)
+    together = found.time and pose and pose[0].topic is topic
+    if together and of_two_sensors(lengths, topic.read([one.name for one in pose]).values):
+        return None
+    lines = f"lengths in {quantity(int((~finite).any(axis=1).sum()))} of {quantity(len(finite))} lines"
+    return lines if are_too_partial(finite) else None
 
 
 def report(data: dict[str, Any]) -> Report:

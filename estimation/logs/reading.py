@@ -81,8 +81,8 @@ def read_measurements(
             names.
 
     Raises:
-        InputError: If a file cannot be read, a field has an unknown unit, more than a fifth of the samples lack a
-            length or a tension (fewer are left out), times do not increase, or clocks cannot be aligned.
+        InputError: If a file cannot be read, a field has an unknown unit, more than a fifth of the samples lack the
+            lengths of some cables (fewer are left out), times do not increase, or clocks cannot be aligned.
     """
     return read_log(path, sigma, poses, robot, fields).measurements
 
@@ -287,10 +287,10 @@ def measurements_of(
     pose = position or orientation
     source = (found.position or found.orientation or (main,))[0]
     together, clock = source.topic is main.topic, None
-    if together and pose is not None and times is not None and found.lengths:
-        complete, known = (np.isfinite(one.values).all(axis=1) for one in (lengths, pose))
-        if (complete & known).sum() < 0.5 * min(complete.sum(), known.sum()):  # a table of two sensors
-            together, lengths = False, Samples(times[complete], lengths.values[complete])
+    is_split = together and pose is not None and found.lengths and of_two_sensors(lengths.values, pose.values)
+    if is_split and times is not None:
+        complete = np.isfinite(lengths.values).all(axis=1)
+        together, lengths = False, Samples(times[complete], lengths.values[complete])
     if pose is not None and not together:
         if times is None or pose.times is None:
             lost = main.full if times is None else source.full
@@ -378,11 +378,23 @@ def _merged(
     return [Samples(at[kept], one[kept]) for one in (moved, forces, poses)]
 
 
+def of_two_sensors(lengths: np.ndarray, poses: np.ndarray) -> bool:
+    """Return whether a table has separate lines for lengths (N, m) and for poses (N, k), with nan elsewhere."""
+    complete, known = (np.isfinite(values).all(axis=1) for values in (lengths, poses))
+    return bool((complete & known).sum() < 0.5 * min(complete.sum(), known.sum()))
+
+
+def are_too_partial(finite: np.ndarray) -> bool:
+    """Return whether no sample is complete, or too many have only some of their numbers; `finite` is (N, m) of bool."""
+    kept = finite.all(axis=1)
+    return not kept.any() or bool((finite.any(axis=1) & ~kept).mean() > MOST_PARTIAL)
+
+
 def _kept(values: np.ndarray, fields: Sequence[Field]) -> np.ndarray:
     """Return the samples that are complete, (N,) of bool; raise InputError if too many have gaps."""
     finite = np.isfinite(values)
     kept = finite.all(axis=1)
-    if not kept.any() or (finite.any(axis=1) & ~kept).mean() > MOST_PARTIAL:
+    if are_too_partial(finite):
         row, column = (int(i) for i in np.argwhere(~finite)[0])
         raise InputError(f"{fields[column].full} must be a finite number at sample {row}, got {values[row, column]:g}")
     return np.asarray(kept)

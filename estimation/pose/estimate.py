@@ -35,8 +35,9 @@ class PoseEstimate(Displayed):
         converged: True if the search ended at a minimum of the residuals, (...).
         sigma: Standard deviations of the measured lengths, (m,) [m].
         carrier_pose: Poses of the carriers, (c, 6) or (..., c, 6), or None if they are at home.
-        ambiguous: True if the search found another pose that may be the true one, (...): it passes the fit test at the
-            0.01 % level, even if the cables cannot hold it with the file's CoM and load. Always False with a start.
+        ambiguous: True if the search found another pose that may be the true one, (...): it passes the test of
+            `consistent` at the 0.01 % level, even if the cables cannot hold it with the file's CoM and load. Always
+            False with a start.
         by_gravity: True if the lengths alone do not determine the pose, and gravity fixes it, (...).
         known_covariance: Covariance due to noise, (..., 6, 6), if the search has computed it: for a single pose with a
             start, and for equilibria; otherwise None.

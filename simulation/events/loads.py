@@ -162,7 +162,7 @@ class Wall(Lasting):
 
     @override
     def begin(self, running: Running) -> None:
-        """Take the step of the simulation."""
+        """Store the duration of a step, over which `wrench` averages the force."""
         self._step = running.periods.period
 
     @override
