@@ -6,7 +6,7 @@ positions and velocities have the noise s_x and s_v, keeps
     (w + K) T <= 1        w^2 s_x + (2 w + K) s_v <= 0.05 g
 
 Defaults keep 0.03 g on robots with at least as many cables as degrees of freedom, whose winches follow the noise.
-States without a time are predicted over the known delay. It may be wrong by 30 %, and T is twice that. Two standard
+States without a time are predicted over the known delay. It may be wrong by 30 %, and T has 80 % of it. Two standard
 deviations of the tensions that noise of velocities requires are inside the limits at home. At about twice these bounds
 robots were lost in simulations with an independent plant. Commands to winches that lag amplify the noise, and leave as
 much of the lag as T permits where the noise permits no more.
@@ -41,7 +41,7 @@ NOISE = 0.05  # of gravity: acceleration by noise of the measured state
 LOST, UNSTABLE = 2.0, 1.5  # times the bounds: robots are lost
 DELAY, PERIOD = 0.647, 1.0  # times the inverse of h: where a late or a held state alone makes attitude loops unstable
 CALM = 0.03  # the same where winches have to follow the noise, as long as it leaves `LEAST` of the usual bandwidths
-MISTOLD = 0.8  # of a known delay over which states without a time are predicted: more than twice what may be wrong about it
+MISTOLD = 0.8  # of a known delay over which states are predicted: more than twice what may be wrong about it
 LEAST = 0.1  # of the usual bandwidths: with less a robot does not follow
 READINGS = 1e3  # [1/s], without a rate
 GRAVITY, TINY = 9.81, 1e-12  # [m/s^2]; what divides

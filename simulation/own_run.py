@@ -50,7 +50,7 @@ def simulation_of(plant: Plant, history: History, reference: Any = None, toleran
     record.tensions[:], record.answered[:] = history.tensions, UNCONTROLLED
     if plant.drive == "lengths" and robot.fixed_lengths is None:
         first = layout.BODY * (1 + len(robot.carriers)) + layout.REFERENCE * robot.m
-        record.ordered[:] = states[[*range(1, count), -1], first : first + robot.m]
+        record.commanded_lengths[:] = states[[*range(1, count), -1], first : first + robot.m]
     doubt, keep_out = "", ()
     if reference is None:
         poses, velocities = record.motions[..., :6], record.motions[..., 6:]

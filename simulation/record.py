@@ -28,7 +28,8 @@ class Record(Displayed):
         carriers, m = len(robot.carriers), robot.m
         self.actuation = np.full((periods, carriers, max(len(carrier.actuators) for carrier in robot.carriers)), np.nan)
         self.motions = np.full((periods, 1 + carriers, 12), np.nan)
-        self.lengths, self.tensions, self.commanded, self.ordered = (np.full((periods, m), np.nan) for _ in range(4))
+        self.lengths, self.tensions = (np.full((periods, m), np.nan) for _ in range(2))
+        self.commanded, self.commanded_lengths = (np.full((periods, m), np.nan) for _ in range(2))
         self.answered = np.zeros(periods, dtype=np.int8)
         self.direction, self.shortfall = np.full((periods, 6), np.nan), np.full(periods, np.nan)
         self.unexplained = np.full(periods, np.nan)
@@ -45,7 +46,7 @@ class Record(Displayed):
                 raise IndexError(command.answered)
             self.direction[k], self.shortfall[k] = command.direction, command.shortfall
         if command.lengths is not None:
-            self.ordered[k] = command.lengths
+            self.commanded_lengths[k] = command.lengths
         if command.released is not None:
             self.released[k] = command.released
         if command.unexplained is not NOTHING:

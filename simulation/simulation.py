@@ -82,8 +82,8 @@ class Simulation(SimulationData, MotionResult, Reported):
         variables["tensions_commanded"] = over(
             cable, record.commanded[rows], "N", "tensions commanded by the controller"
         )
-        if moving and np.isfinite(record.ordered[rows]).all():  # by the end of each period
-            last = record.ordered[rows][:-1]
+        if moving and np.isfinite(record.commanded_lengths[rows]).all():  # by the end of each period
+            last = record.commanded_lengths[rows][:-1]
             ordered = np.vstack([last[0] - (last[1:2] - last[:1]).sum(axis=0), last])
             variables["lengths_commanded"] = over(cable, ordered, "m", "unstrained lengths commanded for each time")
         variables["cable_lengths"] = over(cable, record.lengths[rows], "m", "from anchor to attachment")
