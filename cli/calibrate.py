@@ -56,7 +56,7 @@ def calibrate(
     """
     from ..estimation.calibration import calibrate as find
     from ..estimation.calibration.correction import corrected_log
-    from ..estimation.calibration.solving import usual
+    from ..estimation.calibration.enough import usual
     from ..estimation.logs import read_log
     from ..models import load
 

@@ -13,11 +13,12 @@ from scipy.spatial.transform import Rotation
 from towline.base.errors import InputError
 from towline.estimation.calibration import Measurements, calibrate, next_poses
 from towline.estimation.calibration.clock import begin_with_clock, winds
+from towline.estimation.calibration.enough import usual
 from towline.estimation.calibration.geometry import length_of
 from towline.estimation.calibration.model import Model, State
 from towline.estimation.calibration.normal_equations import metric
 from towline.estimation.calibration.parameters import OF_CABLE, Parameters
-from towline.estimation.calibration.solving import model_of, usual
+from towline.estimation.calibration.solving import model_of
 from towline.estimation.logs.pose_track import PoseTrack
 from towline.models import Dynamics, Robot, load, points
 from towline.models.cables.pulley import exit_points

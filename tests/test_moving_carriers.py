@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from towline import InputError, load
 from towline.estimation.calibration import Measurements, calibrate, corrected
 from towline.estimation.calibration.carrier_clocks import _Recorded
+from towline.estimation.calibration.enough import usual
 from towline.estimation.calibration.plausibility import mistake
-from towline.estimation.calibration.solving import usual
 from towline.estimation.logs import read_log, read_measurements
 
 from .warm import towline as run

@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from towline import InputError, Measurements, load, read_measurements
 from towline.estimation.calibration import attitudes, calibrate
+from towline.estimation.calibration.enough import usual
 from towline.estimation.calibration.geometry import length_of
 from towline.estimation.calibration.plausibility import mistake
-from towline.estimation.calibration.solving import usual
 from towline.estimation.logs import read_log
 from towline.estimation.logs.tables import from_csv
 

@@ -17,12 +17,13 @@ from ..logs.measurements import Measurements
 from .balance import hangs, needs_balance
 from .clock import is_still
 from .considered import from_thrusts
+from .enough import check_enough, is_enough, usual
 from .fit import fit
 from .geometry import length_of
 from .hanging import carrying
 from .model import Model, State
 from .parameters import GROUPS, IN_BALANCE, Parameters
-from .solving import Solved, check_enough, cleaned, covariance_of, is_enough, lengths_of, model_of, solve, usual
+from .solving import Solved, cleaned, covariance_of, lengths_of, model_of, solve
 from .starts import fit_from
 from .turning import turning
 

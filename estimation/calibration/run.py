@@ -8,12 +8,13 @@ from ...models.files import AnyRobot, as_robot
 from ..logs.measurements import Measurements, check_measurements, tracked
 from .calibration import Calibration
 from .cross_validation import extended, select
+from .enough import check_enough, usual
 from .file_errors import errors_of_file, loose
 from .geometry import length_of
 from .parameters import GROUPS, IN_BALANCE, check_free, check_prior
 from .plausibility import mistake
 from .representative import representative
-from .solving import check_enough, solve, usual
+from .solving import solve
 from .stretch import is_elastic, uses_slack, with_elasticity, with_stretch
 from .zeros import has_zeros, with_zeros
 

@@ -7,17 +7,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.display import Displayed
-from ...base.errors import InputError
-from ...base.text import counted
 from ...models.robot import Robot
 from ..logs.cable_directions import placed
-from ..logs.measurements import Measurements, measured, measured_poses, tracked
+from ..logs.measurements import Measurements, measured_poses, tracked
 from ..logs.pose_track import PoseTrack
 from .autocorrelation import information_of
-from .balance import Balance, hangs
+from .balance import Balance
 from .carrier_clocks import CarrierClocks, has_carrier_clocks, with_carrier_clocks
 from .carrier_motion import CarrierMotion
-from .clock import CLOCK_RANGE, begin_with_clock, is_still, moves_smoothly, winds
+from .clock import begin_with_clock
 from .considered import considered
 from .fit import Fit, fit
 from .geometry import length_of
@@ -27,7 +25,7 @@ from .model import Model, State
 from .normal_equations import metric
 from .observability import Observability
 from .outliers import LEAST_THRESHOLD, SHORTEST, Outlier, Slip, find_outliers, find_slips, find_unbalanced, robust
-from .parameters import IN_BALANCE, OF_ROBOT, Parameters
+from .parameters import OF_ROBOT, Parameters
 from .pose_noise import keeping, observed
 from .projection import out_of_plane
 from .repeating_errors import Repeating, repeating
@@ -116,25 +114,6 @@ class Solved(Displayed):
         M = larger * M + D + out_of_plane(model, state, V * roots)
         spread = roots[:, None] * (wide @ M @ wide) * roots
         return Noise(excess, more, redundancy, V @ spread @ V.T, V @ np.linalg.inv(spread) @ V.T, again)
-
-
-def usual(robot: Robot, measurements: Measurements) -> tuple[str, ...]:
-    """Return the default free parameters: offsets, anchors if the readings change, the clock if motion was measured."""
-    still = is_still(measurements)
-    if still and measurements.carrier_poses is None:
-        return ("offsets",)
-    groups = ("anchors", "offsets", "clock")
-    known = measurements.times is not None and not still and is_enough(robot, measurements, ("clock",))
-    return groups if known and winds(measurements) and moves_smoothly(robot, measurements) else groups[:-1]
-
-
-def is_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ...]) -> bool:
-    """Return whether there are enough measurements for these parameters without a prior."""
-    try:
-        check_enough(robot, measurements, groups, {})
-    except InputError:
-        return False
-    return True
 
 
 def solve(
@@ -327,49 +306,6 @@ def model_of(
         carried = felt.tensions if felt and near else None
         weights = ~np.any(list(left_out(robot, measurements, carried).values()), axis=0).T
     return replace(model, weights=weights, felt=felt)
-
-
-def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ...], prior: dict[str, float]) -> None:
-    """Raise InputError unless there are at least as many equations as unknowns, and times and poses for a clock."""
-    parameters = Parameters(robot, groups)
-    if "clock" in groups:
-        known = tracked(robot, measurements)
-        if measurements.times is None:
-            raise InputError("measurements.times must be given to estimate a clock offset, got none")
-        if known.sum() < 4:
-            raise InputError(
-                f"measurements.poses must have at least 4 rows to estimate a clock offset, got {known.sum()}"
-            )
-        if measurements.times[-1] - measurements.times[0] <= 2 * CLOCK_RANGE / 10:
-            raise InputError(
-                f"measurements.times must span more than {CLOCK_RANGE / 5:g} s to estimate a clock offset, got "
-                f"{measurements.times[-1] - measurements.times[0]:g} s"
-            )
-    framed = [name for name in ("frame", "body") if name in groups]
-    if framed and not measured(measurements).any():
-        raise InputError(f"measurements.poses must be given to estimate {', '.join(framed)}, got none")
-    of_forces = [name for name in groups if name in (*IN_BALANCE, "stiffness", "elasticity")]
-    known = {"com", "elasticity"} if hangs(robot, measurements) else {"com"}
-    if measurements.tensions is None and not set(of_forces) <= known:
-        flies = any(carrier.actuators for carrier in robot.carriers)
-        hint = " (or thrusts, attitudes and times of the carriers in a log)" if flies else ""
-        raise InputError(f"measurements.tensions must be given to estimate {', '.join(of_forces)}{hint}, got none")
-    model = Model(parameters, measurements, prior, np.ones((robot.m, len(measurements)), dtype=bool))
-    model = replace(model, interpolates="clock" in groups)
-    if not set(IN_BALANCE).isdisjoint(groups) and (robot.weight == 0.0 or model.balanced is None):
-        needed = "gravity" if robot.weight == 0.0 else "tensions, unless the robot has fewer cables than coordinates"
-        raise InputError(f"free must not have {', '.join(of_forces)} without {needed}, got robot {robot.name}")
-    unknown = np.isinf(model.pose_sigmas)
-    spare = robot.m + (model.balanced.equations if model.balanced else 0) + sighted(measurements) - unknown.sum(axis=1)
-    equations = int(np.maximum(spare, 0).sum())
-    wanted = int((parameters.varies & np.isinf(model.prior_sigmas)).sum())
-    if equations < wanted or equations == 0:
-        lost = int(unknown.any(axis=1).sum())
-        poses = f" with {counted(lost, 'unknown pose')}" if lost else ""
-        raise InputError(
-            f"measurements must give an equation for each of the {wanted} parameters without a prior, got {equations} "
-            f"from {len(measurements)} samples of {robot.m} cables{poses}"
-        )
 
 
 def cleaned(solved: Solved) -> tuple[Measurements, np.ndarray]:
