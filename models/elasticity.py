@@ -81,6 +81,16 @@ def whitening(robot: Robot, pose: np.ndarray) -> np.ndarray:
     return C
 
 
+def whitened(robot: Robot, K: np.ndarray, C: np.ndarray) -> np.ndarray:
+    """Return C K C^T in the coordinates that move, (..., k, k), of stiffnesses K (..., 6, 6); C is their `whitening`.
+
+    At an equilibrium K is symmetric but for rounding and residual wrenches, which are cut off here.
+    """
+    rows = np.flatnonzero(robot.dof_mask)
+    K = K if rows.size == 6 else K[..., rows[:, None], rows]
+    return C @ ((K + K.swapaxes(-1, -2)) / 2) @ C.swapaxes(-1, -2)
+
+
 def frequency(square: ArrayLike) -> np.ndarray:
     """Return frequencies [Hz] from squares of angular ones [rad^2/s^2], negative for negative squares.
 

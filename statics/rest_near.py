@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..models.dynamics import Dynamics, dynamics_of
-from ..models.elasticity import frequency, whitening
+from ..models.elasticity import frequency, whitened, whitening
 from ..models.robot import Robot
 from .equilibria import UNSTABLE, Equilibrium, descend, displaced, judge
 
@@ -124,8 +124,7 @@ def _frequencies(
     """
     rows = np.flatnonzero(robot.dof_mask)
     C = whitening(robot, pose)
-    K = dynamics.stiffness(pose, np.maximum(tensions, 0.0), carriers, elastic=False)[:, rows[:, None], rows]
-    K = C @ (K + K.swapaxes(1, 2)) @ C.swapaxes(1, 2) / 2
+    K = whitened(robot, dynamics.stiffness(pose, np.maximum(tensions, 0.0), carriers, elastic=False), C)
     taut = tensions > ROUNDING * np.maximum(tensions.max(axis=1, keepdims=True), 1e-300)
     A = C @ (dynamics.wrench_matrix(pose, carriers) * taut[:, None])[:, rows]
     held = A @ np.linalg.pinv(A, 1e-9)

@@ -9,7 +9,7 @@ from ..base.display import Displayed
 from ..base.errors import InputError
 from ..base.inputs import finite_array
 from ..models.dynamics import dynamics_of
-from ..models.elasticity import frequency, whitening
+from ..models.elasticity import frequency, whitened, whitening
 from ..models.files import AnyRobot, as_robot
 from ..models.robot import Robot
 from ..solvers.methods.stiffest import Stiffest
@@ -45,12 +45,7 @@ def natural_frequencies(
 
 def frequencies_of(robot: Robot, K: np.ndarray, pose: np.ndarray) -> np.ndarray:
     """Return the natural frequencies (..., k) [Hz] of a platform with stiffnesses (..., 6, 6) at poses (..., 6)."""
-    C = whitening(robot, pose)
-    if not robot.dof_mask.all():
-        rows = np.flatnonzero(robot.dof_mask)
-        K = K[..., rows[:, None], rows]
-    # LAPACK reads one triangle; at an equilibrium K is symmetric but for rounding and residual wrenches.
-    squares = C @ ((K + K.swapaxes(-1, -2)) / 2) @ C.swapaxes(-1, -2)
+    squares = whitened(robot, K, whitening(robot, pose))
     real = np.asarray(np.isfinite(squares).all(axis=(-1, -2)))
     found = frequency(np.linalg.eigvalsh(np.where(real[..., None, None], squares, 0.0)))
     return np.where(real[..., None], found, np.nan)
@@ -99,11 +94,10 @@ def stiffest(
     problem = pose_problem(dynamics, pose, carrier_pose=carrier_pose)
     if w is not None:
         problem = wrench_problem(robot, dynamics.wrench_matrix(pose, carrier_pose), finite_array("w", w, (6,)))
-    rows, C = np.flatnonzero(robot.dof_mask), whitening(robot, np.asarray(pose, dtype=float))
     # K is affine in the tensions as long as all are above zero: its values at some, and at others that differ in one.
     step = robot.t_max
     K = dynamics.stiffness(pose, robot.t_min + np.vstack([np.zeros(robot.m), np.diag(step)]), carrier_pose)
-    K = C @ ((K + K.swapaxes(-1, -2)) / 2)[:, rows[:, None], rows] @ C.T
+    K = whitened(robot, K, whitening(robot, np.asarray(pose, dtype=float)))
     by_tension = (K[1:] - K[0]) / step[:, None, None]
     method = Stiffest(K[0] - np.tensordot(robot.t_min, by_tension, 1), by_tension)
     solution = solve(problem, method)
