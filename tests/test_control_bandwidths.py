@@ -40,6 +40,15 @@ def grows(w, K, delay, told, steps=3000, dt=2e-3):
     return bool(largest[-steps // 4 :].max() > largest[: steps // 4].max())
 
 
+def test_a_push_is_corrected_although_the_delay_is_told_too_long():
+    """By 30 %, with states and commands held for 4 ms, which makes the loop less stable than that of the next test."""
+    controller = ComputedTorque("cogiro", sensors={"delay": 0.06})
+    pushed = {"noise": {"delay": 0.042}, "events": ["push 5 0 0 at 0.2 for 0.2"], "seed": 1}
+    error = simulate("cogiro", load("cogiro").home, controller, duration=3.0, period=4e-3, **pushed).error
+    assert error[100:200].max() > 1e-5
+    assert error[-100:].max() < 1e-2 * error.max()
+
+
 @pytest.mark.parametrize("delay", [0.15, 0.2, 0.25])
 def test_a_loop_with_the_permitted_bandwidths_is_stable_and_one_that_is_refused_is_not(delay):
     """Also if the known delay, over which states are predicted, is wrong by 30 %; 80 % of it counts."""
