@@ -44,7 +44,7 @@ def motions(platform: Motion, carriers: Motion) -> list[np.ndarray]:
 def of_motions(name: str, bodies: Sequence[Body], others: Sequence[ca.SX], values: Sequence[ca.SX]) -> ca.Function:
     """Return the function of values from the whole motions of bodies, (18,) each, and others of their symbols.
 
-    Of bodies that never move its inputs count for nothing.
+    Inputs of bodies that never move have no effect.
     """
     symbols = [body if body.moves else Body.symbols() for body in bodies]
     parts = ca.Function("of_parts", [part for body in symbols for part in body] + [*others], [*values], {"cse": True})

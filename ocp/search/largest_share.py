@@ -132,7 +132,7 @@ def _changed(scenario: Scenario, makers: Sequence[Maker], shares: np.ndarray) ->
 def _largest(at: Callable[[float], Scenario], low: float = 0.0, least: float = EASIEST) -> float:
     """Return the largest share from a low one on whose scenario may be feasible; the low one if none is known.
 
-    Where the first halvings find none, the scenario of the `least` share decides whether the others can.
+    If the first halvings find none, the search goes on only if the scenario of the `least` share may be feasible.
     """
 
     def possible(share: float) -> bool:
