@@ -500,6 +500,26 @@ def test_a_platform_on_a_table_follows_its_lengths():
     np.testing.assert_allclose(dynamics_of(robot).cable_lengths(found.pose), lengths, atol=1e-9)
 
 
+def test_newton_does_not_stay_where_a_load_would_tip_over():
+    """Its CoM a metre above the attachments: the level pose is in balance, but the platform hangs below."""
+    data = load("multi-quadrotor-4").model_dump()
+    robot = Robot.model_validate(data | {"platform": data["platform"] | {"com": (0.0, 0.0, 1.0)}})
+    lengths = dynamics_of(robot).cable_lengths(robot.home)
+    rest = near.rest_near(robot, lengths, robot.home, robot.carrier_home)
+    level = robot.weight * (robot.home[2] + 1.0)
+    assert rest.energy < level - 0.1 * robot.weight
+
+
+def test_newton_knows_that_a_load_on_one_point_turns_freely():
+    data = load("multi-quadrotor-4").model_dump()
+    cables = [cable | {"attachment": (0.0, 0.0, 0.1)} for cable in data["cables"]]
+    robot = Robot.model_validate(data | {"cables": cables})
+    lengths = dynamics_of(robot).cable_lengths(robot.home)
+    held = near.rest_near(load("multi-quadrotor-4"), lengths, robot.home, robot.carrier_home)
+    assert near.rest_near(robot, lengths, robot.home, robot.carrier_home).neutral
+    assert held is None or not held.neutral
+
+
 @pytest.mark.parametrize(("name", "most"), [("cogiro", 3.3), ("ipanema-1", 6.0)])
 def test_noise_costs_few_steps(name, most):
     """About the home of ipanema-1 the matrix of Gauss and Newton alone takes ten steps."""
