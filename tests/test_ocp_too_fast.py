@@ -15,12 +15,12 @@ from towline.ocp.tasks.task import read_task
 
 ROBOT = load("ipanema-1")
 TIMES = np.linspace(0.0, 2.0, 41)
-FINE = np.linspace(0.0, 2.0, 4001)
+FINE = np.linspace(0.0, 2.0, 801)
 
 
-def scenario(speed, acceleration):
-    """A laid-out task with limits of the platform; its path does not matter here."""
-    limits = {"platform_speed": speed, "platform_acceleration": acceleration}
+def scenario(speed, acceleration, **limits):
+    """A laid-out task with limits of the platform and others; its path does not matter here."""
+    limits |= {"platform_speed": speed, "platform_acceleration": acceleration}
     return lay_out(ROBOT, read_task({"path": {"kind": "rest", "pose": [0, 0, 1]}, "duration": 2, "limits": limits}))
 
 
@@ -36,21 +36,24 @@ def exceeded(limited, places, spread, rests):
 @settings(max_examples=200, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.booleans())
 def test_a_motion_that_exists_is_never_proven_too_fast(seed, rests):
-    """Any motion inside a tube about places, with its own largest speed and acceleration as limits."""
+    """Any motion inside a tube about places, with its own largest speeds and accelerations as limits."""
     rng = np.random.default_rng(seed)
     if rests:  # u^2 (3 - 2 u) of a straight line: at rest at both ends
         end, u = rng.uniform(-1, 1, 3), FINE / 2
         motion = (u**2 * (3 - 2 * u))[:, None] * end
-        places = motion[::100] + rng.uniform(-0.1, 0.1, (41, 3))
+        places = motion[::20] + rng.uniform(-0.1, 0.1, (41, 3))
     else:
         waves = np.sin(rng.uniform(0, 10, (5, 1)) * FINE + rng.uniform(0, 6, (5, 1)))
         motion = (rng.uniform(-0.1, 0.1, (3, 5)) @ waves).T
-        places = motion[::100] + rng.uniform(-0.2, 0.2, (41, 3))
-    spread = np.linalg.norm(places - motion[::100], axis=1)
+        places = motion[::20] + rng.uniform(-0.2, 0.2, (41, 3))
+    spread = np.linalg.norm(places - motion[::20], axis=1)
     step = FINE[1]
     speed = np.linalg.norm(np.diff(motion, axis=0), axis=1).max() / step
     acceleration = np.linalg.norm(np.diff(motion, 2, axis=0), axis=1).max() / step**2
-    limited = scenario(speed * (1 + 1e-3), acceleration * (1 + 1e-2))
+    poses = np.column_stack([motion, np.zeros_like(motion)])
+    lengths = Dynamics(ROBOT).cable_lengths(poses, np.tile(ROBOT.carrier_home, (len(FINE), 1, 1)))
+    of_cables = np.abs(np.diff(lengths, 2, axis=0)).max() / step**2
+    limited = scenario(speed * (1 + 1e-3), acceleration * (1 + 1e-2), cable_acceleration=of_cables * (1 + 1e-2))
     assert not exceeded(limited, places, spread, rests)
 
 
@@ -65,6 +68,30 @@ def test_the_bounds_between_two_rests_are_those_of_constant_speed_and_of_bang_ba
     of_acceleration = {"platform_acceleration"} if share < 1 else set()
     assert exceeded(scenario(100, 1.0 * share), places, spread, True) == of_acceleration
     assert not exceeded(scenario(100, 1.0 * share), places, spread, False)
+
+
+@pytest.mark.parametrize("name", ["platform_acceleration", "cable_acceleration"])
+def test_a_circle_that_leaves_its_platform_behind_at_the_start_is_proven_too_fast(name):
+    """From rest the platform goes a t^2 / 2 at most, and may be the tube's radius behind the circle."""
+    radius, rate, tube = 0.3, 1.0, 0.1
+    path = {"kind": "circle", "centre": [0, 0, 1], "radius": radius, "rate": rate}
+    task = {"path": path, "tube": {"position": tube, "ends": "rest"}, "limits": {name: 1e6}}
+    times = np.linspace(0.01, 2, 500)
+    poses = np.zeros((501, 6))
+    poses[1:, :3] = radius * np.column_stack([np.cos(rate * times), np.sin(rate * times), 0 * times])
+    poses[0, 0] = radius
+    poses[:, 2] = 1.0
+    moved = 2 * radius * np.sin(rate * times / 2)[:, None]
+    if name == "cable_acceleration":
+        lengths = Dynamics(ROBOT).cable_lengths(poses, np.tile(ROBOT.carrier_home, (501, 1, 1)))
+        moved = np.abs(lengths[1:] - lengths[0])
+    least = (2 * (moved - tube) / times[:, None] ** 2).max()  # at the end, by symmetry in time, a similar one
+    for share in (0.5, 0.97):
+        task["limits"][name] = share * least
+        proof = infeasible_ends(lay_out(ROBOT, read_task(task)))
+        assert {excess.limit for excess in proof.excess} == {name}
+    for limits in ({name: 1.5 * least}, {"cable_jerk": 0.5 * least}):  # a jerk is no acceleration
+        assert infeasible_ends(lay_out(ROBOT, read_task(task | {"limits": limits}))) is None
 
 
 @pytest.mark.parametrize("tube", ["free", 0.05])

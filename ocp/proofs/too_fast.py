@@ -2,8 +2,8 @@
 
 From one time to another, a body moves at least as far as its places are apart, less its permitted distances from them.
 Its mean speed, from which its largest one follows, is at least this distance divided by the time; its largest
-acceleration, if it is at rest at both times, at least four times the distance divided by the square of the time. Inside
-a tube, second differences bound the acceleration.
+acceleration, if it is at rest at one of the times, at least twice the distance divided by the square of the time, and
+if it is at rest at both, four times. Inside a tube, second differences bound the acceleration.
 """
 
 from collections.abc import Iterator
@@ -13,8 +13,8 @@ import numpy as np
 from ...base.text import quantity
 from ...models.points import placed
 from ..audits.excess import Excess
-from ..limits import Limit
-from ..limits.cables import CableSpeed
+from ..limits import Limit, Rate
+from ..limits.cables import CableAcceleration, CableSpeed
 from ..limits.carriers import CarrierAcceleration, CarrierSpeed
 from ..limits.platform import PlatformAcceleration, PlatformSpeed, ZoneSpeed
 from ..tasks.scenario import Scenario
@@ -46,22 +46,22 @@ def too_fast(
     yield from _too_short(scenario, times, places[0], of_com, bool(still[0]))
     lengths = None
     for limit in scenario.limits:
-        if limit.soft is not None:
+        if limit.soft is not None or isinstance(limit, Rate):
             continue
         body = 0 if limit.hull is None or limit.hull.carrier is None else 1 + limit.hull.carrier
-        x, off = places[body, :, None, :3], (spread[body] if body else of_origin)[:, None]
-        if isinstance(limit, PlatformSpeed | CarrierSpeed):
-            yield from _mean_rate(limit, times, x, off)
-        elif isinstance(limit, ZoneSpeed):
-            yield from _mean_rate(limit, times, limit.way(x), off)
-        elif isinstance(limit, CableSpeed):
+        x, off, rests = places[body, :, None, :3], (spread[body] if body else of_origin)[:, None], bool(resting[body])
+        if isinstance(limit, CableSpeed | CableAcceleration):
             if lengths is None:
                 poses = places[0], places[1:].swapaxes(0, 1)
                 lengths = scenario.dynamics.cable_lengths(*poses)[..., None]
             ends = (spread[0] + spread[1:][scenario.robot.carrier_of_cable]).T
-            yield from _mean_rate(limit, times, lengths[:, limit.cables], ends[:, limit.cables])
-        elif isinstance(limit, PlatformAcceleration | CarrierAcceleration):
-            yield from _acceleration(limit, times, x[:, 0], off[:, 0], bool(resting[body]))
+            x, off, rests = lengths[:, limit.cables], ends[:, limit.cables], bool(still.all())
+        if isinstance(limit, PlatformSpeed | CarrierSpeed | CableSpeed):
+            yield from _mean_rate(limit, times, x, off)
+        elif isinstance(limit, ZoneSpeed):
+            yield from _mean_rate(limit, times, limit.way(x), off)
+        elif isinstance(limit, PlatformAcceleration | CarrierAcceleration | CableAcceleration):
+            yield from _acceleration(limit, times, x, off, rests)
 
 
 def _too_short(
@@ -105,17 +105,33 @@ def _mean_rate(limit: Limit, times: np.ndarray, x: np.ndarray, off: np.ndarray) 
 
 
 def _acceleration(limit: Limit, times: np.ndarray, x: np.ndarray, off: np.ndarray, rests: bool) -> Iterator[Excess]:
-    """Yield the limit of an acceleration if that of a motion within off (n,) of x (n, 3) must exceed it."""
-    whole = times[-1] - times[0]
-    moved = np.linalg.norm(x[-1] - x[0]) - off[-1] - off[0]
-    worst, at = 4 * moved / whole**2 if rests else -np.inf, 0.0
-    why = "the smallest possible from rest to rest in this time"
+    """Yield the limit of an acceleration if motions within off (n, k) of vectors x (n, k, d) must exceed it."""
+    worst, begin, end = (-np.inf, 0), 0.0, 0.0
+    for least, begins, ends in _least_accelerations(times, x, off, rests):
+        row, which = np.unravel_index(least.argmax(), least.shape)
+        if least[row, which] > worst[0]:
+            worst, begin, end = (float(least[row, which]), int(which)), float(begins[row]), float(ends[row])
+    value, which = worst
+    if value > limit.high + limit.tolerance:
+        at_rest = [rests and time in times[[0, -1]] for time in (begin, end)]
+        why = f"the smallest possible from t = {begin:.3f} s to t = {end:.3f} s"
+        if any(at_rest):
+            why += " from rest to rest" if all(at_rest) else f", with rest at the {'start' if at_rest[0] else 'end'}"
+        yield Excess(limit.name, limit.labels[which], (begin + end) / 2, value, limit.high, limit.unit, why=why)
+
+
+def _least_accelerations(
+    times: np.ndarray, x: np.ndarray, off: np.ndarray, rests: bool
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Yield bounds of accelerations, (r, k), with the times at which their spans begin and end, (r,) each."""
     for steps in range(1, (len(times) - 1) // 2 + 1):
         before, here, after = slice(None, -2 * steps), slice(steps, -steps), slice(2 * steps, None)
-        bent = np.linalg.norm(x[before] - 2 * x[here] + x[after], axis=1) - off[before] - 2 * off[here] - off[after]
-        least = bent / (times[steps] - times[0]) ** 2
-        if least.max() > worst:
-            worst, at = float(least.max()), float(times[here][least.argmax()])
-            why = f"the smallest possible from t = {at - times[steps]:.3f} s to t = {at + times[steps]:.3f} s"
-    if worst > limit.high + limit.tolerance:
-        yield Excess(limit.name, limit.labels[0], at, float(worst), limit.high, limit.unit, why=why)
+        bent = np.linalg.norm(x[before] - 2 * x[here] + x[after], axis=2) - off[before] - 2 * off[here] - off[after]
+        yield bent / (times[steps] - times[0]) ** 2, times[before], times[after]
+    if rests:
+        for end in (0, -1):
+            moved = np.linalg.norm(x - x[end], axis=2) - off - off[end]
+            spans, other = np.delete(times - times[end], end), np.delete(times, end)
+            factors = np.where(other == times[-1 - end], 4.0, 2.0)  # the other end is at rest too
+            least = factors[:, None] * np.delete(moved, end, axis=0) / np.square(spans)[:, None]
+            yield least, np.minimum(other, times[end]), np.maximum(other, times[end])
