@@ -72,7 +72,7 @@ def main() -> None:
     import compiler
 
     class Build(build_ext):
-        """The build of the core by the machine's compiler or that of the package ziglang."""
+        """The build of the core by the machine's compiler or by the package ziglang."""
 
         def run(self) -> None:
             """Build; for an editable installation where other builds do, and not anew what is up to date there."""

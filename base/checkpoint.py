@@ -120,7 +120,7 @@ def _begin(path: Path, kind: Kind, database: sqlite3.Connection, header: dict[st
 
 
 def _check(path: Path, database: sqlite3.Connection, header: dict[str, Any]) -> None:
-    """Raise InputError if the database is damaged, or its header is that of another run."""
+    """Raise InputError if the database is damaged, or its header belongs to another run."""
     whole = database.execute("PRAGMA quick_check(1)").fetchone() == ("ok",)
     broken = "SELECT count(*) FROM record WHERE crc32(CAST(content AS BLOB), number) IS NOT crc"
     content = database.execute("SELECT content FROM record WHERE number = ?", (HEADER,)).fetchone()

@@ -131,7 +131,7 @@ def _check_dataset(name: str, dataset: Any, account: _Account) -> None:
     import h5py
 
     layout = dataset.get_create_plist()
-    # Before the shape: that of a virtual dataset depends on the other files.
+    # Before the shape, which in a virtual dataset depends on the other files.
     if layout.get_external_count() or layout.get_layout() == h5py.h5d.VIRTUAL:
         raise InputError(f"{_name(name)} must be in the file itself, got values in other files")
     kind = dataset.get_type()

@@ -52,7 +52,7 @@ def moved_name(package: str | None, name: str) -> Any:
 def install() -> None:
     """Let former names be imported."""
     if not any(isinstance(finder, _Finder) for finder in sys.meta_path):
-        sys.meta_path.insert(0, _Finder())  # before that of paths, which finds folders that were left behind
+        sys.meta_path.insert(0, _Finder())  # before the finder of paths, which finds folders that were left behind
 
 
 class _Finder:
@@ -82,4 +82,4 @@ class _Loader:
         return module
 
     def exec_module(self, module: ModuleType) -> None:
-        module.__spec__ = self.spec  # the import system has put that of the former name there
+        module.__spec__ = self.spec  # the import system has put the spec of the former name there

@@ -88,7 +88,7 @@ def save_netcdf(contents: Contents, path: Path, compressed: Collection[str] = ()
         file.attrs.update(contents.attributes)
         for name, variable in everything.items():
             values, attributes = np.asarray(variable.values), dict(variable.attributes)
-            # Coordinates beside those of the dimensions are named by this convention (CF 1.11, section 5).
+            # Coordinates besides those of the dimensions are named by this convention (CF 1.11, section 5).
             beside = [
                 other
                 for other, coordinate in contents.coordinates.items()
@@ -117,7 +117,7 @@ def load_netcdf(path: Path, refusal: str) -> xr.Dataset:
     import h5netcdf
     import xarray as xr
 
-    with _alone:  # the hook and the warnings are those of the whole process
+    with _alone:  # the hook and the warnings belong to the whole process
         # A damaged file leaves a half-opened one behind, whose closing prints a traceback as soon as it is collected.
         hook, sys.unraisablehook = sys.unraisablehook, lambda unraisable: None
         try:

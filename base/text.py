@@ -161,7 +161,7 @@ def _decimals(value: float, count: int) -> str:
 
 
 def in_columns(rows: Sequence[Sequence[str]], right: Collection[int]) -> list[str]:
-    """Return rows as lines of a table, its columns as wide as they need, those of the indices `right` flush right."""
+    """Return rows as lines of a table, its columns as wide as they need, columns of the indices `right` flush right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [
         "  ".join(

@@ -1,7 +1,7 @@
 """The quadratic programs of predictive control solved by acados: partial condensing and HPIPM, through its C library.
 
 The step of acados' real-time iteration without the linearisation, so that all solvers have the same programs. The
-library is that of the variable `ACADOS_SOURCE_DIR`, with which acados is built and used, or of the package `acados`.
+library is given by the variable `ACADOS_SOURCE_DIR`, with which acados is built and used, or by the package `acados`.
 The wheel of that package contains a CasADi that replaces the one of towline, so it needs a folder of its own:
 
     pip install --no-deps --target DIR comma-deps-acados

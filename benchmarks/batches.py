@@ -32,7 +32,7 @@ FEW = 100  # poses of a reference that takes milliseconds
 
 
 def measure(robot: Robot, count: int, runs: int) -> Iterator[tuple[str, float, str]]:
-    """Yield what is computed, the time of a pose [s], and that of a reference, or a share of the poses."""
+    """Yield what is computed, the time of a pose [s], and the time of a reference, or a share of the poses."""
     rng, dynamics = np.random.default_rng(0), Dynamics(robot)
     poses = robot.home + 0.1 * robot.length * rng.uniform(-1, 1, (count, 6)) * robot.dof_mask
     near = poses + rng.normal(0, 1e-3, poses.shape)

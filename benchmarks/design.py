@@ -6,8 +6,8 @@ Anchors and attachments are free in the boxes of the published ones. The objecti
 7 x 7 x 5 positions, computed by the same core for all. No contender knows the published layout:
 
 - towline: the search of `design` with `start: random`.
-- pymoo GA: its genetic algorithm, whose first population are the best 150 of 3000 layouts that are drawn as those of
-  towline's annealing are, half of the coordinates at bounds; uniform draws are worse.
+- pymoo GA: its genetic algorithm, whose first population are the best 150 of 3000 layouts that are drawn as
+  towline's annealing draws them, half of the coordinates at bounds; uniform draws are worse.
 - cma: CMA-ES inside the bounds, from their middle; cma, drawn: from the best of these draws. Neither is better for
   both robots.
 
@@ -73,7 +73,7 @@ class Task:
         return shares[np.argsort([-self.score(share) for share in shares])[:POPULATION]]
 
     def judged(self, y: np.ndarray) -> float:
-        """Return the smallest margin at random positions and those of the grid [N]."""
+        """Return the smallest margin at random positions and at the grid's [N]."""
         poses = self.requirements.require[0].sampled(AUDITED, np.random.default_rng(0))
         return float(min(self._at(poses).margins(y).min(), self._evaluation.margins(y).min()))
 
@@ -96,7 +96,7 @@ def pymoo(task: Task) -> np.ndarray:
         def _evaluate(self, x: np.ndarray, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
             out["F"] = -task.score(x)
 
-    first: Any = task.draws()  # pymoo's type is that of one of its own samplings
+    first: Any = task.draws()  # pymoo's annotation permits only its own samplings
     algorithm = GA(pop_size=POPULATION, sampling=first)
     left = max(task.until - time.perf_counter(), 1e-3)
     found = minimize(Layout(), algorithm, ("time", left), seed=int(task.rng.integers(2**31)))

@@ -66,7 +66,7 @@ def solve_problem(
     eps_abs: float = 1e-9,
     method: str = "active-set",
 ) -> qpsolvers.Solution:
-    """Solve a QP with diagonal cost, equations and limits; the signature is that of qpsolvers' back ends.
+    """Solve a QP with diagonal cost, equations and limits; the signature is as qpsolvers' back ends have it.
 
     - `problem`: the QP; sparse matrices are made dense. `initvals`, `verbose`: not used.
     - `eps_abs`: residuals and duality gap that are good enough. It matters only where the equations are nearly

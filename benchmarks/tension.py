@@ -4,7 +4,8 @@
 
 qpbenchmark calls each solver once per problem, cold; a controller calls it every millisecond. Here each contender
 solves the problems of a task one after the other, in blocks that take turns, so that a machine that heats up or slows
-down does so for all. A ratio is the median over the turns of a block's median to that of `daqp.solve` in the same turn.
+down does so for all. A ratio is a block's median over the median of `daqp.solve` in the same turn, as the median of
+all turns.
 """
 
 import time

@@ -50,9 +50,9 @@ def calibrate(
     """Estimate anchors, offsets and more from measured cable lengths, and write a calibrated robot file.
 
     The file includes the covariance of its new parameters. Carriers are taken to be at their recorded poses, or at
-    home if the log has none. Nothing is written, and the exit code is 1, if the log probably has an input error (order
-    of cables, units, conventions of angles, frames), if the fit did not converge, or if validation samples fit worse
-    than with the robot's file. --fix corrects input errors of the log.
+    home if the log has none. A result that should not be used is not written, and the exit code is then 1: for example,
+    if the log probably has an input error (order of cables, units, conventions of angles, frames), the fit did not
+    converge, or validation samples fit worse than with the robot's file. --fix corrects input errors of the log.
     """
     from ..estimation.calibration import calibrate as find
     from ..estimation.calibration.correction import corrected_log

@@ -9,7 +9,7 @@ from .options import FPS, SPEED, print_result
 
 
 class Outputs(NamedTuple):
-    """The files that a command writes besides that of its result, and how it prints the result."""
+    """The files that a command writes besides its result, and how it prints the result."""
 
     as_json: bool
     figures: Path | None = None  # folder

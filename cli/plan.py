@@ -112,7 +112,7 @@ def plan(
         raise typer.Exit(1)
 
 
-@one_thread_each()  # before libraries load: a plan must not depend on the number of threads, nor on that of processes
+@one_thread_each()  # before libraries load: a plan must not depend on the number of threads or processes
 def sweep(robot: str, task: Path, vary: list[str], where: dict[str, Any], out: Path | None, outputs: Outputs) -> None:
     """Plan all combinations, save, draw and print the table; the exit code is 1 if no plan is feasible.
 

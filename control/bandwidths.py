@@ -156,9 +156,9 @@ def place_for(attitude: float, place: float | None) -> float:
 def noise_of_change(robot: Robot, sensors: Noise | Mapping[str, Any] | None) -> float:
     """Return the standard deviation of an unexplained change of velocity, of all coordinates together [m/s].
 
-    It is that of the difference of two measured velocities, and of their prediction over the `WINDOW` of a `Watch` with
-    measured tensions; 0 without `sensors`. Rates of angles are multiplied by the robot's length. Raises `InputError` if
-    `sensors` has a wrong value.
+    It includes the noise of two measured velocities, and of measured tensions by which the change is predicted over the
+    `WINDOW` of a `Watch`; 0 without `sensors`. Rates of angles are multiplied by the robot's length. Raises
+    `InputError` if `sensors` has a wrong value.
     """
     if sensors is None:
         return 0.0

@@ -36,7 +36,7 @@ class Moved(ABC):
         """Return the coordinates and two derivatives, (K, 3, f), for motions (K, 3, 6) and (K, c, 3, 6)."""
 
     def recentre(self, platform: np.ndarray, carriers: np.ndarray) -> None:
-        """Change the coordinates, those of `tethers`, if motions as in `along` come near their bounds."""
+        """Change the coordinates of `tethers` if motions as in `along` come near their bounds."""
         return None
 
     @abstractmethod
@@ -99,7 +99,7 @@ class Freed(Moved):
 
     @override
     def now(self, dt: float, measured: np.ndarray, reference: np.ndarray) -> np.ndarray:
-        """Return the coordinates and their rates, (2, f): first those of the reference, then as commanded."""
+        """Return the coordinates and their rates, (2, f): first of the reference, then as commanded."""
         place, rate, acceleration = self._placed
         if self.count and np.isfinite(self._placed).all():
             place += dt * rate + dt * dt / 2 * acceleration

@@ -61,8 +61,8 @@ class ComputedTorque(Controller):
             `bandwidth` and `observer` are lowered, because the loop is unstable from 1 / b on. Both are restored after
             two steps that are closer together. A given bandwidth is kept, with a warning. If carriers fly, all
             bandwidths are lowered by the same factor, because their attitude loops need steps of at most 0.75 /
-            `attitude` minus 1.5 times the mean age of states with a `time`. Other carriers that correct errors need
-            steps of at most 0.75 / `carrier_bandwidth`.
+            `attitude`, less 1.5 times the mean age of the states if these have a `time`. Other carriers that correct
+            errors need steps of at most 0.75 / `carrier_bandwidth`.
         damping: Damping ratio z: Kd = 2 z b.
         integral: Ki [1/s^3], a number or one for each coordinate. It pauses while the status is not "as planned".
         observer: Bandwidth of the estimates of the disturbance and of forces on flying carriers [rad/s]; 0: no
@@ -322,7 +322,7 @@ class ComputedTorque(Controller):
     def _late_by(self, age: float, dt: float) -> float:
         """Return the time between steps that delays attitude loops as much as the mean age of states [s].
 
-        The mean is that of all states during the first second, because a loop may be unstable with the first ones.
+        The mean is over all states during the first second, because a loop may be unstable with the first ones.
         """
         self._aged_for = min(self._aged_for + dt, 1.0)
         self._age += min(dt / self._aged_for if self._aged_for else 1.0, 1.0) * (min(age, OLDEST) - self._age)

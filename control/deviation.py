@@ -51,7 +51,7 @@ class Deviation:
         return bool(last > most and first <= END_FAR)
 
     def status(self, answered: np.ndarray, poses: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-        """Return the status of each platform, (N,), from that of its tensions; poses and references are (N, 6)."""
+        """Return the status of each platform, (N,), from its tensions' status; poses and references are (N, 6)."""
         far = self.are_far(poses, wanted) & ((answered == PLANNED) | (answered == SHIFTED))
         return np.where(far, OFF, answered).astype(np.int8) if far.any() else answered
 

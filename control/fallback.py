@@ -12,9 +12,9 @@ CARRIED = 0.1  # the same of what fewer cables than degrees of freedom cannot gi
 
 
 def answer_others(robot: Robot, problems: InPlace, last: np.ndarray) -> np.ndarray:
-    """Return the status of each row, and let rows without tensions have those of the `last` command, (N, m) [N].
+    """Return the status of each row, and give rows without tensions those of the `last` command, (N, m) [N].
 
-    The direction and the shortfall of a row become those of the wrench that its tensions miss, if these prove more.
+    The direction and the shortfall of a row then describe the wrench that its tensions miss, if that proves more.
     """
     force, scale = robot.force_scale, robot.wrench_scale
     missing = scale * (problems.w - (problems.A @ problems.tensions[..., None])[..., 0])

@@ -29,7 +29,7 @@ class LateStates:
         """Remember the tensions (N, m) of the last step, `dt` [s] ago.
 
         At the first step nothing is known but `before`, tensions (N, m) or (m,) that are measured or planned [N]. The
-        first ones without nan are taken for those of the time before, or those of the first step.
+        first ones without nan are taken as the tensions of the time before, or as those of the first step.
         """
         known = [np.resize(one, self._count).tobytes() for one in before if one is not None and np.isfinite(one).all()]
         if not self._begun and (dt > 0 or known):

@@ -27,7 +27,7 @@ from .state import Reference, State
 
 SHARE, STRAIN = 0.05, 0.005  # of the robot's length, and of the longest cable: the default of `most`
 DAMPED = 0.002  # [s/m]: damping of unknown cables, in terms of their stiffness
-PERIOD = 1e-3  # [s]: taken to be that of the steps at the first one
+PERIOD = 1e-3  # [s]: assumed for the steps at the first one
 QUICKEST = 2e-3  # [s]: in which winches follow that are said to have no lag
 SAMPLED = 2000  # references that are looked at before a run
 HELD = 0.2  # [s]: a robot whose pose stays the same for longer does not move

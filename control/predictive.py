@@ -285,7 +285,7 @@ class Predictive(ComputedTorque):
         """Compare the motion with the prediction, and hand over if they differ."""
         if not np.isfinite(self._problems.w).all():
             return
-        # The comparison is that of the time of the measurement, because observers and predictions know no more.
+        # The comparison is for the time of the measurement, because observers and predictions know no more.
         motions, (before, start, known) = self._measured if self._late is None else self._late, self._before
         if self._seen <= before:
             return

@@ -12,7 +12,7 @@ from .records import CONTROLLER
 
 SLOW = 20.0  # [rad/s], with which observers learn that tensions differ from their commands, see core/control/heard.c
 
-LEAN = 1.5  # forces are inside a cone whose tangent is this times that of the largest tilt in plans
+LEAN = 1.5  # tangent of the cone of forces, over the tangent of the largest tilt in plans
 LEVEL, STEEPEST = 0.6, 1.5  # [rad]: at least and at most this tilt, since a push may need more than a gentle plan
 
 

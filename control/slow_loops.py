@@ -18,7 +18,7 @@ class SlowLoops:
     carriers are the fastest, or the loops of other carriers that correct errors. All other loops are closed around
     them, so they are lowered by the same factor.
 
-    - `settings`: those of the controller, which are changed.
+    - `settings`: settings of the controller, which are changed.
     - `adapts`: whether the bandwidth of the error may be lowered.
     - `usual`: default bandwidth of the error [rad/s].
     """

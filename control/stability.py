@@ -17,7 +17,7 @@ SLOWEST = 1e-3  # [rad/s]
 LEAST, SLOW, MOST = 400, 4.0, 1500  # steps, time constants of the errors, and steps again
 FAR = 0.3  # of the robot's length: errors that have grown
 MORE = 1.2  # of the velocities in the second third of the steps are in the last: a motion nobody damps has as many
-PUSH, PUSHED = 0.01, 0.05  # of the robot's weight, and for how long [s]: so little that the loop is that of first order
+PUSH, PUSHED = 0.01, 0.05  # of the robot's weight, and for how long [s]: so little that the loop is linear
 
 _KEPT: dict[tuple[type[ComputedTorque], bytes], bool] = {}
 

@@ -146,7 +146,7 @@ def _of_samples(robot: Robot, samples: Contents) -> Trajectory:
     motion = [
         np.concatenate([read(part, (n, 6))[:, None], read(f"carrier_{part}", (n, count, 6))], axis=1) for part in _PARTS
     ]
-    motion[0][..., 3:] = np.unwrap(motion[0][..., 3:], axis=0)  # those of a flight are measured, and may jump by turns
+    motion[0][..., 3:] = np.unwrap(motion[0][..., 3:], axis=0)  # angles of a flight are measured, and may jump by turns
     if n < 2 or nodes[0] < 0 or np.diff(nodes).min() < SHORTEST:
         given = f"{n} of them from {nodes[0]:g} s to {nodes[-1]:g} s" if n else "none"
         raise InputError(f"reference must be a plan of two times or more that increase from 0 s on, got {given}")

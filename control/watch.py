@@ -1,8 +1,8 @@
 """`Watch`: compare a robot's motion with its model; `HandOver`: when and why another controller took over.
 
-`lost_carrier` finds a flying carrier without thrust, and `flaw_of_carriers` also those that turn too late. What a lost
-thrust does to the platform is small in large teams: with one of six lost, the platform's own acceleration shows it
-after 70 to 140 ms, that of the carrier after 10 to 45.
+`lost_carrier` finds a flying carrier without thrust, and `flaw_of_carriers` also those that turn too late. In large
+teams a lost thrust hardly moves the platform: with one of six lost, the platform's acceleration shows it after 70 to
+140 ms, the carrier's after 10 to 45 ms.
 """
 
 from collections import deque
@@ -48,7 +48,7 @@ def lost_carrier(robot: Robot, forces: np.ndarray) -> int | None:
     gravity = np.array(robot.gravity)
     masses = [0.0 if carrier.body is None else carrier.body.mass for carrier in robot.carriers]
     excess = forces @ gravity - LOST * np.array(masses) * (gravity @ gravity)
-    excess = np.nan_to_num(excess, nan=-np.inf)  # an unknown force must not hide that of another carrier
+    excess = np.nan_to_num(excess, nan=-np.inf)  # an unknown force must not hide the force of another carrier
     index = int(np.argmax(excess))
     return index if excess[index] > 0 else None
 

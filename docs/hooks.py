@@ -44,7 +44,7 @@ def on_startup(**_: object) -> None:
 
 
 def _each(shared: re.Match[str]) -> str:
-    """Describe each parameter apart: mkdocstrings gives those of one line the type of the first, and no defaults."""
+    """Describe each parameter apart: mkdocstrings gives all that share a line the first one's type, and no defaults."""
     indent, names, description = shared.groups()
     return "".join(f"{indent}{name}{description}" for name in names.split(", "))
 

@@ -19,7 +19,7 @@ def faces(points: np.ndarray) -> list[np.ndarray]:
         return []
     if rank == 2:
         return [ConvexHull(arms @ axes[:2].T).vertices]
-    # Qhull cuts each face into triangles; those of one plane are one face again.
+    # Qhull cuts each face into triangles; triangles in one plane become one face again.
     hull = ConvexHull(arms)
     size = float(np.linalg.norm(arms, axis=1).max())
     planes: list[tuple[np.ndarray, set[int]]] = []

@@ -26,7 +26,7 @@ class Section(NamedTuple):
 
 
 class Table(NamedTuple):
-    """Rows of equal kind under named columns; those of `numeric` are aligned on the right."""
+    """Rows of equal kind under named columns; columns in `numeric` are aligned on the right."""
 
     title: str
     columns: Sequence[str]

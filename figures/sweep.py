@@ -38,7 +38,8 @@ def sweep(
 
     - `status`: word for each plan, an axis for each varied field.
     - `quantities`: by their labels, shaped like `status`, nan where a plan has none.
-    - `lower`: labels of those of which less is better; of the others more is (default: none). Maps ring the best plan.
+    - `lower`: labels of quantities of which less is better; of all others more is better (default: none). Maps ring
+      the best plan.
     """
     known = {label: values for label, values in quantities.items() if np.isfinite(values).any()}
     quantities = known or {"no plan is feasible": np.full(status.shape, np.nan)}

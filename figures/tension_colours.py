@@ -52,7 +52,7 @@ def scale() -> style.ScalarMappable:
 def mark(bar: style.Colorbar, t_min: np.ndarray, t_max: np.ndarray, size: float) -> None:
     """Label a colour bar of `scale` with the limits (m,) [N], and tensions between them if all cables have the same.
 
-    `size` is that of the letters [points].
+    `size` is the height of the letters [points].
     """
     places = {0.0: "t_min", 1.0: "t_max"}
     if np.ptp(t_min) == 0 and np.ptp(t_max) == 0:

@@ -95,7 +95,7 @@ def reached(result: xr.Dataset, anchors: np.ndarray | None = None) -> style.Figu
 
 
 def _contours(ax: style.Axes, result: xr.Dataset, behind: str, across: str, up: str) -> None:
-    """Fill the areas of `SHARES`, of counts averaged with those of the neighbouring cells, which few samples need."""
+    """Fill the areas of `SHARES`; counts are averaged over neighbouring cells, because samples may be few."""
     from scipy.ndimage import gaussian_filter
 
     counts = result[["tried", "reached"]].sum(behind).transpose(up, across)

@@ -1,6 +1,6 @@
 """`Evaluation`: margins, distances and frequencies of many layouts of a robot at given poses, with derivatives.
 
-The characteristic length stays that of the robot's file, whatever the attachments become: a design would otherwise
+The characteristic length of the robot's file is kept, whatever the attachments become: a design would otherwise
 change the unit in which it is measured.
 """
 
@@ -97,7 +97,7 @@ class Slopes(NamedTuple):
 class Evaluation:
     """Evaluate layouts at the rows of requirements.
 
-    - `variables`: those of the design.
+    - `variables`: variables of the design.
     - `rows`: poses and wrenches.
     - `room`: bounds of distances and lengths (default: none).
     """

@@ -3,9 +3,9 @@
 At one pose, each cable gives t (u, r x u) with a tension inside its range, an attachment r in its box and a unit vector
 u towards its box of anchors. Along a direction d that is at most t d . (u, r x u) for the best of these: for a given u
 it is linear in r, so a corner of the box is the best attachment, and the best u is the projection of d_F + d_M x r on
-the cone of all directions from the box of attachments to that of anchors. The sum over the cables bounds the wrenches
-of all layouts; a required wrench beyond the bound is impossible. The direction is found by Gilbert's algorithm. It is
-a relaxation: u is chosen without regard to r, so that nothing follows where no such direction exists.
+the cone of all directions from the box of attachments to the box of anchors. The sum over the cables bounds the
+wrenches of all layouts; a required wrench beyond the bound is impossible. The direction is found by Gilbert's
+algorithm. It is a relaxation: u is chosen without regard to r, so that nothing follows where no such direction exists.
 """
 
 from dataclasses import dataclass

@@ -130,7 +130,7 @@ class _Search:
         return bool(limits.any() and not limits.all()) and every.missing(y) <= 0.0
 
     def _starts(self) -> Iterator[None]:
-        """Improve annealed layouts: one of each symmetry, then as often that of the best one as any other."""
+        """Improve annealed layouts: one of each symmetry, then half of the best symmetry, half of random ones."""
         mirrors, rng = Mirrors(self._variables), self._rng
         kinds = [None, *mirrors.signs]
         order, best = list(rng.permutation(len(kinds))), 0

@@ -37,7 +37,7 @@ class Variables:
         return np.abs(self.S[6 * self.robot.m :]).sum(axis=0) > 0.0
 
     def with_points_held(self, y: np.ndarray) -> "Variables":
-        """Return these variables with the points fixed at those of y, (p,); the tension limits stay free."""
+        """Return these variables with the points fixed at their values in y, (p,); the tension limits stay free."""
         low, high = (np.where(self.limits, bound, y) for bound in (self.low, self.high))
         return replace(self, low=low, high=high)
 

@@ -23,10 +23,10 @@ _COLUMNS = {"anchor": 0, "attachment": 3, "radius": 6}  # of `Mechanics.columns_
 
 
 class Mechanics:
-    """Compute a robot's mechanics at one pose or at many: arguments, results and errors are those of `Dynamics`.
+    """Compute a robot's mechanics at one pose or at many: arguments, results and errors as in `Dynamics`.
 
     - `robot`: one that `record.fits`.
-    - `record`: the record to read at each call, whose ends of cables may change; default: that of the robot.
+    - `record`: the record to read at each call, whose ends of cables may change; default: the robot's.
     """
 
     def __init__(self, robot: Robot, record: np.ndarray | None = None):

@@ -58,7 +58,7 @@ AT_ORIGIN: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def optional(description: str, default: Any = None, **constraints: Any) -> Any:
-    """Return a field that may be left out. The keyword arguments are those of pydantic's `Field`."""
+    """Return a field that may be left out. Keyword arguments as for pydantic's `Field`."""
     return Field(default=default, description=description, **constraints)
 
 

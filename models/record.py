@@ -67,7 +67,7 @@ def fits(robot: Robot) -> bool:
 def record_of(robot: Robot) -> np.ndarray:
     """Return the record of a robot, of `RECORD`, shape (); it is kept for the next call and cannot be written to.
 
-    Stiffness and damping are those of the file, 0 where it has none. Raises `InputError` if the robot has more
+    Stiffness and damping are from the file, 0 where it has none. Raises `InputError` if the robot has more
     cables, carriers or actuators than the core has room for.
     """
     for name, most, count in _counts(robot):

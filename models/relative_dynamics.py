@@ -35,7 +35,7 @@ class RelativeDynamics(Displayed):
     docs/theory.md names the paper.
 
     `pose`, `velocity` and `acceleration` describe the platform frame relative to {A}, in the axes of {A};
-    `carrier_pose`, `carrier_velocity` and `carrier_acceleration` are those of {A} in {G}, default: at home and at rest.
+    `carrier_pose`, `carrier_velocity` and `carrier_acceleration` describe {A} in {G}, default: at home and at rest.
     Each is (..., 6) [m, rad], since the only carrier needs no dimension of its own.
 
     `robot` is a `Robot` with one carrier, the name of one in the library, or the path of a robot file; `functions` are
@@ -129,7 +129,7 @@ def _relative_functions(robot: Robot) -> dict[str, ca.Function]:
     run = kinematics.cables(robot, motion.pose, anchors, axes)
     A = kinematics.wrench_matrix(robot, motion.pose, run.directions)
     D_B = base_disturbance(robot, motion)
-    still = ca.DM.zeros(3)  # without gravity, which D_B has, M_B ddX_b + F_B is that of the relative motion
+    still = ca.DM.zeros(3)  # without gravity, which is in D_B, M_B ddX_b + F_B is the wrench of the relative motion
     w = rigid_body.body_wrench(*rigid_body.body_of(robot), still, *motion[:3]) + D_B
     in_world = list(motion_in_world(motion))
     disturbing = motion._asdict()

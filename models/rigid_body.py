@@ -1,4 +1,4 @@
-"""Newton and Euler for the platform in {G}: the wrench that its motion needs, that of the air, and accelerations.
+"""Newton and Euler for the platform in {G}: the wrench that its motion needs, the air's wrench, and accelerations.
 
     force  : m (a_c - g)                       a_c = ddx + alpha x R c + omega x (omega x R c)
     moment : I alpha + omega x I omega         I = R I_b R^T, omega = R Omega, alpha = R (dP dTheta + P ddTheta)
@@ -8,7 +8,7 @@ Eq. 4, which omits the gyroscopic term, and Eq. 12, which takes ddTheta for the 
 
 A load that the platform carries needs the same about its own CoM, and the moment of its force about the platform's.
 
-The air's wrench is that of paper F,
+The air's wrench follows paper F,
 
     F_x = 1/2 rho C_d S V_x |V_x|,  F_y alike,  F_z = 1/2 rho C_l S (V_x^2 + V_y^2),  no moment about the CoM
 
@@ -52,7 +52,7 @@ def carried_wrench(robot: Robot, load: Matrix, pose: Matrix, velocity: Matrix, a
     """Return the wrench, (6, 1), that a load fixed to the platform needs, in {G}: [N], [N m] about the platform's CoM.
 
     The load is its mass [kg], CoM in the platform frame (3) [m] and inertia about it (Ixx, Iyy, Izz, Ixy, Ixz, Iyz)
-    [kg m^2], (10, 1); the motion is that of `inertial_wrench`.
+    [kg m^2], (10, 1); motion as in `inertial_wrench`.
     """
     mass, com = load[0], load[1:4]
     xx, yy, zz, xy, xz, yz = (load[i] for i in range(4, 10))

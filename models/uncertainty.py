@@ -56,7 +56,7 @@ class Uncertainty(Part):
         return self
 
     def __hash__(self) -> int:
-        """Return a hash of names and variances: that of all numbers takes longer than a call that looks it up."""
+        """Return a hash of names and variances; to hash all numbers would take longer than a call that looks it up."""
         return hash((self.parameters, tuple(row[i] for i, row in enumerate(self.covariance))))
 
     @property
@@ -88,6 +88,6 @@ class Uncertainty(Part):
         return units[:, None] * directions[:, kept] * np.sqrt(eigenvalues[kept])  # (p, r)
 
     def errors(self, count: int, seed: int) -> np.ndarray:
-        """Draw errors of the parameters, (count, p) [m], the same ones for the same seed."""
+        """Draw errors of the parameters, (count, p), in their units, such as [m]; the same ones for the same seed."""
         factor = self.factor
         return np.random.default_rng(seed).standard_normal((count, factor.shape[1])) @ factor.T  # (count, p)

@@ -157,7 +157,7 @@ class Planner(Displayed):
     def _plan_again(
         self, first: Search, scenario: Scenario, start: Deviation | None, timing: PathTiming | None = None
     ) -> Plan:
-        """Plan another scenario in the remaining time of the first search; `timing` is that of the same path."""
+        """Plan another scenario in the remaining time of the first search; `timing` is the timing of the same path."""
         scenario, chosen = shortest_durations(scenario)
         self._search = search = Search(scenario, {}, first.progress, first.seconds_left, timing=timing)
         search.stages += [chosen.stage] if chosen else []

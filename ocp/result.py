@@ -221,7 +221,7 @@ class PlanData(Displayed):
     def share_of_robots(self, count: int = 200, seed: int = 0) -> RobotShare:
         """Sample robots from the uncertainty, and check whether each has tensions inside its limits along the motion.
 
-        Poses and required wrenches are those of the plan, at some 200 times. Nothing is linearised: each robot has its
+        Poses and required wrenches are from the plan, at some 200 times. Nothing is linearised: each robot has its
         own wrench matrices, and the exact solver decides.
 
         Args:

@@ -21,5 +21,5 @@ LENGTHS, RATES, FORCES, TENSIONS = 0, 1, 2, 3
 # acceleration).
 AIR, WIND, WRENCH, COMMANDS, CARRIER, CARRIER_WRENCH, REFERENCE_POSE = 0, 1, 4, 10, 30, 6, 12
 
-SUDDEN = 100.0  # [m/s^2, rad/s^2] that a polynomial would need beyond those of its reference: the carrier jumps to it
+SUDDEN = 100.0  # [m/s^2, rad/s^2] that a polynomial would need beyond its reference's: the carrier then jumps to it
 SHORTEST = 1e-3  # [m] of cable that a winch leaves out

@@ -53,7 +53,7 @@ class Periods:
     def run(self, states: np.ndarray, commands: np.ndarray, history: np.ndarray, tensions: np.ndarray) -> None:
         """Write states and tensions at the beginning and at the end of a period.
 
-        - `states`, `commands`: (N, n) and (N, K, k), see `Plant`: the first command is that of the period; carriers
+        - `states`, `commands`: (N, n) and (N, K, k), see `Plant`: the first command belongs to the period; carriers
           move on to a second.
         - `history`, `tensions`: results, (N, 2, n) and (N, 2, m) [N].
         """

@@ -27,7 +27,7 @@ class Orders:
     - `plant`: the plant.
     - `conditions`: conditions of the runs.
     - `seeds`: seed of the wind and of the drives, one for each run.
-    - `record`: the robot as events change it; default: that of the plant.
+    - `record`: the robot as events change it; default: the plant's.
     """
 
     def __init__(self, plant: Plant, conditions: Experiment, seeds: Sequence[int], record: np.ndarray | None = None):

@@ -9,8 +9,8 @@ from ..estimation.calibration.geometry import length_of
 from .replayed_robot import Parameters
 from .windows import Windows
 
-# Of each parameter: its smallest and largest value, and the step of its derivative; those of the CoM over the length of
-# the platform, those of anchors over that of the cables.
+# Of each parameter: its smallest and largest value, and the step of its derivative; for the CoM over the platform's
+# length, for anchors over the cables' length.
 RANGES = {
     "delay": (-0.2, 0.2, 1e-3),
     "friction": (0.0, 1e5, 0.1),
@@ -70,8 +70,8 @@ class Matching:
     """Compare a recording with its plant for different parameters."""
 
     def __init__(self, windows: Windows, parameters: Parameters):
-        # the windows, their starts corrected within the noise of the recording. Their noise has that of simulations
-        # too.
+        # the windows, their starts corrected within the noise of the recording. Their noise includes
+        # the noise of simulations.
         self.windows = windows
         shaken = windows.shaken()
         self._linearise(parameters)
@@ -183,7 +183,7 @@ class Matching:
         return best, sigma
 
     def explanations(self, first: Match, used: np.ndarray) -> list[tuple[Explanation, Match]]:
-        """Return what each parameter alone explains, from a match on in windows `used`, that of most first."""
+        """Return what each parameter alone explains, starting at a match, in windows `used`, largest first."""
         from scipy.special import stdtrit
 
         found, whole, count = [], first.cost[used].sum(), float(np.count_nonzero(first.left[used]))
@@ -241,7 +241,7 @@ def _plain(value: np.ndarray) -> Any:
 
 
 def tied(found: Sequence[Explanation]) -> list[str]:
-    """Return the name that explains most, and those of others that explain as much; none if it explains nothing."""
+    """Return the name that explains most, and the names of others that explain as much; none if it explains nothing."""
     least = (1 - TIED) * found[0].explained if found and found[0].named else np.inf
     rivals = [one for one in found if one.named and one.explained >= least]
     return [one.name for one in rivals if one is found[0] or one.name in ALONE]

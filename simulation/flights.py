@@ -59,7 +59,7 @@ def copies(controller: Controller, count: int) -> list[Controller]:
 
 
 def plant_of(plant: Plant, conditions: Experiment, seed: int) -> Plant:
-    """Return the plant of a run, which may differ from that of the robot's file."""
+    """Return the plant of a run, whose robot may differ from its file."""
     robot = conditions.mismatch.robot(plant.robot, seed)
     return plant if robot is plant.robot else Plant(robot, drive=plant.drive)
 

@@ -82,7 +82,7 @@ def fly(
 
     Each `Period` that runs live is given to `take`.
 
-    Returns the number of simulated periods of each run, (N,), smaller than that of references if it diverged (at
+    Returns the number of simulated periods of each run, (N,), smaller than the number of references if it diverged (at
     least 1); and the computing times of the controller's steps [s].
 
     Raises `InputError` if the controller returns an invalid command.

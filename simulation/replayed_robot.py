@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from ..models.robot import Robot
 
-QUICK = 400.0  # [rad/s]: that of core/plant/winch_forces.h
+QUICK = 400.0  # [rad/s]: as in core/plant/winch_forces.h
 STRAIN = 1e-3  # at t_max, of cables whose stiffness is not known
 
 
@@ -25,7 +25,7 @@ class Parameters(NamedTuple):
     load_cells: tuple[float, ...] = ()
     cable_friction: tuple[float, ...] = ()  # dry friction of each cable beyond `friction`, (m,) [N]
     anchors: tuple[float, ...] = ()  # anchors less the file's, (3 m,) [m]
-    thrusts: tuple[float, ...] = ()  # recorded thrusts over those of the carriers, minus 1, (c,)
+    thrusts: tuple[float, ...] = ()  # recorded thrusts over the carriers' thrusts, minus 1, (c,)
 
 
 def modelled(robot: Robot, drive: str, flown: np.ndarray) -> Robot:

@@ -149,7 +149,7 @@ class Windows:
         self.inside = np.stack([np.arange(most) < len(one) for one in spans])
 
     def _noise(self) -> dict[str, float]:
-        """Return the noise of what is compared, and keep that of the pose."""
+        """Return the noise of what is compared, and keep the noise of the pose."""
         of, known, moves = self.recorded, self._known, self.recorded.robot.dof_mask > 0
         turned = Rotation.from_matrix(self._track.at_times(of.times[known]).at(0.0)[1]).inv()
         away = (turned * Rotation.from_matrix(self._rotation[known])).as_rotvec()

@@ -218,7 +218,7 @@ def _column(value: Array, core: int, rows: int, lead: tuple[int, ...]) -> tuple[
 def _solve_by_core(
     rows: _Rows, columns: list[tuple[Array, int]], in_lanes: bool, rho: float, threads: int | None
 ) -> None:
-    """Solve all rows by the core, shared among threads; those of which it is not sure stay unsure."""
+    """Solve all rows by the core, shared among threads; rows with an uncertain result stay uncertain."""
     count, m = rows.tensions.shape
     share = threads or min(processors.available(), max(1, count // ROWS_WORTH_A_THREAD))
     per = np.array([size for _, size in columns], dtype=np.float64)

@@ -32,7 +32,7 @@ _ERROR = 2.0**-73
 def exact_optimum(problem: TensionProblem, nearest: Array) -> Projection:
     """Find the tensions of least cost inside their limits whose wrench is w, or the nearest to it.
 
-    The residual is that of the tensions before they are rounded. Where the wrench is not the nearest, rho is raised
+    The residual refers to the tensions before they are rounded. Where the wrench is not the nearest, rho is raised
     until its error falls no more.
 
     - `problem`: the problem.

@@ -85,7 +85,7 @@ class Horizon(Displayed):
         multipliers: See `Multipliers`. `solve(warm=True)` starts from these, and from states and controls.
         tolerance, iterations_max: Largest residual of a converged solution, and largest number of iterations. Default:
             1e-8 and 50.
-        converged, iterations: Success of the last solution, and the number of Newton matrices that it needed, without
+        converged, iterations: Success of the last solution, and the number of Newton systems solved, not counting
             the one of a cold start.
 
     Raises:

@@ -63,9 +63,9 @@ def margins(
 
 
 def all_reserves(A: np.ndarray, w: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -> np.ndarray:
-    """Return the reserves along all normals that may be those of facets, (N, K) [N]; the least is the margin.
+    """Return the reserves along all normals that may belong to facets, (N, K) [N]; the least is the margin.
 
-    The arguments are those of `margins`. Normal k is orthogonal to the k-th subset of n - 1 columns in lexicographic
+    Arguments as for `margins`. Normal k is orthogonal to the k-th subset of n - 1 columns in lexicographic
     order; the reserve may be infinite where these depend on each other. Of a flat set, and with a cable that has no
     choice, only the margin is given, as the first.
     """

@@ -79,7 +79,7 @@ class StandardForm(NamedTuple):
         above, below = s - self.lower, self.upper - s
         near = AT_LIMIT * max(1.0, np.sqrt(square))
         held = (above <= near) | (below <= near)
-        # A limit is known to rounding of its own size, that of an infinite one to rounding of everything.
+        # A limit is known up to rounding relative to its own size, at most 1, the size of s.
         size = np.minimum(np.maximum(np.abs(self.lower), np.abs(self.upper)), 1.0)[held]
         most = DECISIVE / SLACK * square / np.maximum(size, SLACK)
         normals = self.N[:, held]

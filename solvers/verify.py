@@ -53,7 +53,7 @@ def verify(
 
     - `problem`, `form`: the problem, and the form of it that the method got.
     - `method`, `proposal`, `tensions`: the method, its proposal, and that in tensions [N], (m,).
-    - `exact`: the least squares [N], (m,), if the form is that of what is left to choose on the boundary; else None.
+    - `exact`: the least squares [N], (m,), if the form contains only what is left to choose on the boundary; else None.
     - `last`: False if another form is left to try: then only what is accepted is judged, and None is returned
       otherwise.
     """

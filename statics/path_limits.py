@@ -4,8 +4,8 @@ A motion q(tau) that is followed at a rate r(t), with dtau/dt = r, stays on its 
 
     w = a u + b r^2 + c,   u = dr/dt
 
-with c the wrench of rest, a that of the velocity dq/dtau as an acceleration, and b what velocities and accelerations of
-the plan need in addition to c: r = 1 and u = 0 are the plan itself. Each facet of the available wrench set
+with c the wrench at rest, a the wrench of an acceleration of dq/dtau, and b what velocities and accelerations of the
+plan need in addition to c: r = 1 and u = 0 are the plan itself. Each facet of the available wrench set
 (`solvers.available_wrench`) therefore bounds u at each tau and r.
 """
 

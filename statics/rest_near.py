@@ -25,7 +25,7 @@ SLACK = 1e-3  # of the weight: a cable that would pull less at the start is slac
 
 
 def rest_near(robot: Robot, lengths: np.ndarray, start: np.ndarray, carriers: np.ndarray) -> Equilibrium | None:
-    """Return a stable equilibrium near a pose, or None; arguments are those of `rests_near` for one pose."""
+    """Return a stable equilibrium near a pose, or None; arguments as for `rests_near`, for one pose."""
     rests, found = rests_near(robot, lengths[None], start[None], carriers[None])
     return rests.only(0) if found[0] else None
 
@@ -120,7 +120,7 @@ def _frequencies(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest natural frequency of N equilibria, negative if unstable, and the one nearest to zero [Hz].
 
-    Both are those of motions that taut cables of constant lengths permit; large numbers if there are none.
+    Both refer to motions that taut cables of constant lengths permit; large numbers if there are none.
     """
     rows = np.flatnonzero(robot.dof_mask)
     C = whitening(robot, pose)

@@ -1,4 +1,4 @@
-"""`scene`: the 3-D scene of a plan or a simulation at given times; `scene_at`: that of a robot at one pose."""
+"""`scene`: the 3-D scene of a plan or a simulation at given times; `scene_at`: the scene of a robot at one pose."""
 
 from __future__ import annotations
 

@@ -8,8 +8,8 @@ the cables on it change with the wrench by the least amount,
 so each carrier is where its cable has the direction of its force. If carriers hold several cables, and the cables give
 every wrench, tensions change instead, by A^+ (w - w_plan), and the carriers stay on their paths. Their acceleration,
 tilt and efforts follow. They, and the tensions, bound how soon the platform can rest: of some durations, the shortest
-that keeps all limits is taken. Lengths that winches change are those of the plan where carriers hold one cable each;
-otherwise they follow from tilted carriers.
+that keeps all limits is taken. If carriers hold one cable each, winches keep the lengths of the plan; otherwise lengths
+follow from the tilts of the carriers.
 """
 
 from collections.abc import Sequence
@@ -65,8 +65,8 @@ def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Team
     """
     if not (_have_one_each(robot) or _give_every_wrench(robot)):
         raise InputError(
-            "a stop must be of a robot whose flying carriers have one cable each, or cables that give every wrench, of "
-            f"fixed length only if those of a carrier begin at one point, got {robot.name!r}"
+            "a stop must be of a robot whose flying carriers have one cable each, or cables that give every wrench "
+            f"(cables of fixed length must begin at one point of each carrier), got {robot.name!r}"
         )
 
     fly = len(carriers_of(robot).flying) == len(robot.carriers)
@@ -151,7 +151,7 @@ def _windings(
 
 
 def _least(square: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Return the solution of square systems; if they are singular, nearly that of least norm."""
+    """Return the solution of square systems; if they are singular, nearly the one of least norm."""
     size = np.trace(square, axis1=1, axis2=2)[:, None, None]
     return np.linalg.solve(square + TINY * size * np.eye(square.shape[1]), right)
 
@@ -203,7 +203,7 @@ class _Stops:
         flying, keep = its.flying, self.robot.fixed_lengths is None and not _have_one_each(self.robot)
         planned = [part.reshape(*self.tau.shape, -1, 6) for part in self.planned]
         pose, starts = planned[0].copy(), [part[0] for part in self.planned]
-        # The stop begins with the plan's own tilt, which between the plan's nodes is not quite that of balance.
+        # The stop begins with the plan's own tilt, which between the plan's nodes is not quite the tilt of balance.
         usual = self._tilts(planned[2], self._before)
         for attempt in range(TILTS if turns else 1):
             if not keep:
@@ -279,7 +279,7 @@ def _forces(
 
     `kept`, (n,), is the share of the plan's imbalance that remains, and `after`, (n,) [s], the time after the plan's
     end, from which its tensions fade to constants: those that balance an extrapolated motion can be negative.
-    `tilted` has the poses of the carriers, (..., c, 6), if these are not those of the plan, `carriers`.
+    `tilted` has the poses of the carriers, (..., c, 6), if these differ from the plan's, `carriers`.
     """
     rows = np.flatnonzero(robot.dof_mask)
     scale = robot.wrench_scale[rows]

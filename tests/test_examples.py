@@ -140,7 +140,7 @@ def test_an_example_does_what_it_says(name, tmp_path):
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_the_documentation_shows_it(name):
-    assert f"pictures/{name}.png" in (ROOT / "docs" / "examples.md").read_text()
+    assert f"`{name}.py`" in (ROOT / "docs" / "examples.md").read_text()
     picture = (ROOT / "docs" / "pictures" / f"{name}.png").read_bytes()
     assert picture.startswith(b"\x89PNG")
     assert len(picture) <= MOST_BYTES

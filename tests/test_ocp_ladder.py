@@ -250,7 +250,7 @@ def test_a_path_is_a_start():
 
 def test_wrong_starts_are_refused():
     planner = Planner(load("cogiro"), {"path": LINE, "duration": 3, "tube": TUBE, "steps": 10})
-    with pytest.raises(InputError, match=r"start\.frame must be 'world', as that of the task's path, got 'quad'"):
+    with pytest.raises(InputError, match=r"start\.frame must be 'world', as in the task's path, got 'quad'"):
         planner.plan(start={"kind": "rest", "pose": [0, 0, 2], "frame": "quad"})
     with pytest.raises(InputError, match=r"start must be a Plan, a path .*, got 3"):
         planner.plan(start=3)

@@ -324,7 +324,7 @@ def test_lines_without_a_value_are_listed(tmp_path):
     (tmp_path / "log.csv").write_text("t,l1,l2\n0,1,1\n0.1,,1\n0.2,1,1\n")
     told = json.loads(towline("log", "log.csv", "--json", code=1, cwd=tmp_path).stdout)
     assert told["files"][0]["topics"][0]["empty"] == {"lengths": 1}
-    assert "lines without lengths: 1" in towline("log", "log.csv", code=1, cwd=tmp_path).stdout
+    assert "lines with missing lengths: 1" in towline("log", "log.csv", code=1, cwd=tmp_path).stdout
 
 
 @pytest.mark.parametrize(

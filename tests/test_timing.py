@@ -443,7 +443,7 @@ def test_corners_and_dwells_are_rests_of_the_fastest_law():
         ),
         ({"s": (0, 0.5, 1), "speeds": (0, 1, 0), "dwell": (0,)}, "dwell must have one number for each of the 3 s"),
         ({"s": (0, 0.5, 1), "speeds": (0, 1)}, "one number for each of the 3 s"),
-        ({"s": (0, 0.5, 1), "speeds": (0, 1, 0), "frame": "quad"}, "must be that of along"),
+        ({"s": (0, 0.5, 1), "speeds": (0, 1, 0), "frame": "quad"}, "must equal along.frame"),
     ],
 )
 def test_laws_that_are_none_are_refused(law, message):

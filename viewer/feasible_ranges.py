@@ -20,7 +20,7 @@ STRIP = "height:4px;margin:-30px calc(0.625rem + 3.84rem) 26px calc(0.625rem + 6
 def holding(robot: Robot, settings: list[Slider], pose: np.ndarray, carriers: np.ndarray) -> np.ndarray:
     """Return whether tensions inside their limits hold the platform at rest, (s, `PLACES`) along each of s sliders.
 
-    Along each, the other coordinates are those of `pose` (6,) and `carriers` (c, 6) in {G} [m, rad].
+    While one varies, the others keep their values in `pose` (6,) and `carriers` (c, 6) in {G} [m, rad].
     """
     poses, others = np.tile(pose, (len(settings), PLACES, 1)), np.tile(carriers, (len(settings), PLACES, 1, 1))
     for number, setting in enumerate(settings):

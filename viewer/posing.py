@@ -225,9 +225,9 @@ def few_cables(robot: Robot) -> bool:
 
 
 def opening_pose(robot: Robot, geometry: Geometry) -> np.ndarray:
-    """Return the pose (6,) at which a view opens: that of `home_at_rest`, or the feasible pose nearest to it.
+    """Return the pose (6,) at which a view opens: `home_at_rest`, or the feasible pose nearest to it.
 
-    If the search finds no feasible pose, it is that of `home_at_rest`.
+    If the search finds no feasible pose, it is `home_at_rest`.
     """
     home = home_at_rest(robot)
     if few_cables(robot):

@@ -144,7 +144,7 @@ class Stage:
 
         In portrait pictures, as on a phone, the camera is farther away, and the robot above the panel.
 
-        - `camera`: of viser: the initial one, or that of a client.
+        - `camera`: viser's initial camera, or a client's.
         - `width`, `height`: of its picture [pixels].
         - `view`: one of `VIEWS`.
         """
@@ -154,7 +154,7 @@ class Stage:
         away = self.extent.nearest / min(width / height, free, 1.0)
         side = np.cross([0.0, 0.0, 1.0], along)
         upwards = np.cross(along, side / np.linalg.norm(side))
-        # The part that the panel leaves free has its centre above that of the picture.
+        # The centre of the part that the panel leaves free is above the centre of the picture.
         centre = self.extent.centre - (1.0 - free) * away * np.tan(FIELD_OF_VIEW / 2) * upwards
         camera.position = centre + away * along
         camera.look_at = centre
@@ -162,7 +162,7 @@ class Stage:
         camera.near, camera.far = 1e-3 * self._size, 50 * self._size
 
     def leave(self) -> None:
-        """Let cameras be, because the scene is that of another stage from now on."""
+        """Leave cameras alone, because the scene belongs to another stage from now on."""
         with self._turning:
             self._left = True
 

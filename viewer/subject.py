@@ -47,7 +47,7 @@ class Subject(Displayed):
         for name, kind in (("replay", Replay), ("cloud", Cloud), ("other", Replay)):
             part = getattr(self, name)
             if part is not None and not isinstance(part, kind):
-                raise InputError(f"{name} must be that of a subject from `read`, or None, got {shown(part)}")
+                raise InputError(f"{name} must be the {name} of a subject from `read`, or None, got {shown(part)}")
 
     @property
     def kind(self) -> str:

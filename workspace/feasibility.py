@@ -20,7 +20,7 @@ PLACES_AT_ONCE = 8192
 ONLY_EXACT = 0.01  # of the force scale
 NEAREST = 1e10  # weight of the wrench error, so large that the tensions do not change the nearest wrench
 ROUNDS = 4
-GROWTH = 1.02  # of the differences: those of the next tensions may be larger
+GROWTH = 1.02  # factor for the differences, which may be larger for the next tensions
 UNCERTAIN_AT_ONCE = 1024  # a place takes some 3000 numbers for a robot of which 48 are uncertain
 ROUNDING = 1e-12  # of the largest limit
 

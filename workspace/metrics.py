@@ -85,7 +85,7 @@ def _condition_number(robot: Robot, places: Places) -> np.ndarray:
 def _tension_factor(robot: Robot, places: Places) -> np.ndarray:
     """Return the largest r for which tensions between r and 1 give no wrench: no facet's plane may exclude zero.
 
-    Along its normal such tensions give at most the sum of the positive pulls less r times that of the negative ones.
+    Along its normal such tensions give at most the sum of the positive pulls less r times the sum of the negative ones.
     """
     found = np.empty(len(places))
     for part, A in _some_matrices(robot, places):

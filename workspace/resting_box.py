@@ -17,7 +17,7 @@ STEPS = 10  # from the middle of the grid to each of its sides
 class RestingBox(NamedTuple):
     """Positions of the platform at which it can rest in its home attitude, its tensions inside their limits."""
 
-    # corners in {G}, (3,) [m]; infinite where nothing bounds the box. A locked coordinate is that of home in both.
+    # corners in {G}, (3,) [m]; infinite where nothing bounds the box. A locked coordinate has its home value in both.
     low: np.ndarray
     high: np.ndarray
     # the position about which the box was grown, (3,) [m]: home, or the nearest sample at which it can rest
@@ -65,7 +65,7 @@ def largest_box(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners of the box of largest volume that contains a node and only nodes that are able.
 
-    - `able`: flags of the nodes of a grid, (nx, ny, nz); that of `centre` is true.
+    - `able`: flags of the nodes of a grid, (nx, ny, nz); the flag of `centre` is true.
     - `axes`: coordinates of the nodes along each axis, rising. An axis with one node is left out of the volume.
     - `centre`: the node, (3,).
     - `around`: how many nodes more to go on every side, where there are so many.

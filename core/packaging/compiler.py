@@ -1,4 +1,4 @@
-"""Find the C compiler of the core: that of the machine, or the package ziglang."""
+"""Find the C compiler of the core: the machine's, or the package ziglang."""
 
 import os
 import shutil

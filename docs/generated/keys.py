@@ -146,7 +146,7 @@ def _bounds(field: Schema) -> str:
 
 
 def _default(field: Schema) -> str:
-    """Return the default of a key; that of a part is left out, since the part's own keys have theirs."""
+    """Return the default of a key; defaults of parts are left out, because their own keys have defaults."""
     value = field.get("default")
     if value is None or isinstance(value, dict) or value == []:
         return ""

@@ -140,8 +140,8 @@ def _turned(given: Measurements, rotation: Rotation) -> Measurements:
 def _fitted(robot: Robot, given: Measurements) -> tuple[float, dict[str, np.ndarray]]:
     """Return the sum of squares with offsets and the CoM fitted, and the turns from the measured orientations.
 
-    The turns are those of the world and of the sensor, in the axes of each, (n, 3) [rad]. Samples that fit far worse
-    than most count only up to a limit, as wrong readings should not decide.
+    The turns are of the world and of the sensor, in the axes of each, (n, 3) [rad]. Samples that fit far worse than
+    most count only up to a limit, because wrong readings should not decide.
     """
     few = np.unique(np.linspace(0, len(given) - 1, min(len(given), MOST_FITTED)).astype(int))
     groups = ("offsets", "com") if needs_balance(robot, given) and robot.weight else ("offsets",)

@@ -4,10 +4,10 @@ With derivatives J_k of the equations of sample k, minus the part of its pose, t
 
     M = sum_k,l r(l) J_k'J_(k+l)
 
-if errors e have the correlation r(l) with those l samples later. With r of the residuals, averaged over cables, M is
+if errors e have the correlation r(l) with errors l samples later. With r of the residuals, averaged over cables, M is
 known far better, and in every direction, than from sums J'e of a few blocks of the record. Residuals are P_k e_k less
-what parameters absorb, with P_k = 1 - R_k R_k' for unknown poses: the sum of all e_k'e_(k+l) is r(l) times that of all
-tr(P_k P_(k+l)), less that of all tr(J_k C J_(k+l)') with the covariance C of the parameters.
+what parameters absorb, with P_k = 1 - R_k R_k' for unknown poses: the sum of all e_k'e_(k+l) is r(l) times the sum
+of all tr(P_k P_(k+l)), less the sum of all tr(J_k C J_(k+l)') with the covariance C of the parameters.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ CERTAIN, BY_CHANCE = 3.0, 2.0  # standard deviations of independent errors that 
 
 
 class Equations(NamedTuple):
-    """Equations of one kind, with poses eliminated and of independent errors: P^1/2 times those of each sample.
+    """Equations of one kind, with poses eliminated and independent errors: each sample's, multiplied by P^1/2.
 
     Derivatives times a root of the covariance X (n, k, r), residuals (n, k), and P^1/2 (n, k, k).
     """
@@ -88,7 +88,7 @@ def information_of(model: Model, state: State, root: np.ndarray, white: np.ndarr
         if max(map(len, r)) == 1:
             return white, 1.0
         M = sum((_added(kinds[0], r[0]) for kinds in every()), white)
-    # Errors and derivatives may change together, as where a platform rests, and those of forces differ by direction.
+    # Errors and derivatives may change together, as where a platform rests, and errors of forces differ by direction.
     first = np.concatenate([[1.0], np.full(lags - 1, 2.0)])
     sums = [
         float(first[: len(k)] @ of[3, : len(k)]) * of[1, 0] / max(of[0, 0], 1e-300)

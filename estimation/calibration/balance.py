@@ -30,7 +30,7 @@ from .parameters import Parameters
 OWN = 2e-3  # of the weight: standard deviation of forces that the model lacks
 LASTING = 1.0  # [s] for which these forces, such as drag, hardly change
 NOISY = 2.0  # times the stated standard deviations, of the noise that tensions of a motion show
-HARDLY = 0.1  # of the mean tension, that of cables which hardly pull
+HARDLY = 0.1  # of the mean tension: cables with less hardly pull
 LEAST_TENSION = 0.1  # of a cable's mean: relative errors of smaller tensions are not smaller
 UNMEASURED = 3.0  # times the weight or the largest mean tension: standard deviation of one that was not measured
 MOST_CAPSTAN = 30.0  # of which exp is no overflow
@@ -158,7 +158,7 @@ class Balance:
         self._scale = robot.wrench_scale[self._rows]
 
     def only(self, rows: np.ndarray | slice) -> Balance:
-        """Return the balance at some samples (k,), whose motion is that of the whole log."""
+        """Return the balance at some samples (k,), with the motion of the whole log."""
         other = copy(self)
         other._chosen = self._chosen[rows]
         return other
@@ -193,7 +193,7 @@ class Balance:
     def tensions(self, table: np.ndarray, smooth: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Return the tensions that the platform feels [N], (N, m), with derivatives.
 
-        The derivatives are by capstan, friction, gain and zero, (N, m, 4). `table` is that of `Parameters`, (m, 15).
+        The derivatives are by capstan, friction, gain and zero, (N, m, 4). `table` is as in `Parameters`, (m, 15).
         """
         moving, signs, y = self._log.terms[int(smooth)][:, self._chosen]
         gain, zero = table[:, 13], table[:, 14]
@@ -257,14 +257,14 @@ class Balance:
         return self._forces(of, x, placed, clock, 1.0).most_likely
 
     def smoothed(self, tensions: np.ndarray) -> np.ndarray:
-        """Return tensions of the whole log (N, m) [N], smoothed if it is that of a motion."""
+        """Return tensions of the whole log (N, m) [N], smoothed if the platform moves."""
         smooth = self._log.motion.smooth
         return tensions if smooth is None else smooth.values(tensions[None])[0]
 
     def felt(self, table: np.ndarray, noise: float) -> FeltTensions:
         """Return the measured tensions, smoothed, with errors that make cables seem stiffer unless they are unknowns.
 
-        Corrections by the balance of forces would have the errors of accelerations, which those of poses cause.
+        Corrections by the balance of forces would have the errors of accelerations, which errors of poses cause.
         """
         tensions, _ = self.tensions(table, smooth=True)
         variances, smooth = self._log.variances[self._chosen], self._log.motion.smooth

@@ -1,6 +1,6 @@
 """Estimate, along with a fit, clock offsets of carriers that another computer recorded: `with_carrier_clocks`.
 
-`sigma.clocks` of the measurements is the standard deviation of these clocks about that of the platform's poses. All
+`sigma.clocks` of the measurements is the standard deviation of these clocks, relative to the platform's. All
 that a carrier recorded, which is its motion and the tensions and directions of its cables, is moved in time together.
 Derivatives of all residuals by the clocks are differences. From their normal equations poses and parameters are
 eliminated, as in `NormalEquations`, and a step of the clocks is taken before each further fit. The covariance of the
@@ -39,7 +39,7 @@ class CarrierClocks(NamedTuple):
 
     Attributes:
         carriers: Indices of the carriers, (k,).
-        ahead: Time by which each clock is ahead of that of the platform's poses, (k,) [s].
+        ahead: Time by which each clock is ahead of the clock of the platform's poses, (k,) [s].
         covariance: Their covariance, (k, k) [s^2].
         effect: Derivatives of the free parameters, in metres, by the clocks, (p, k) [m/s].
     """
@@ -71,7 +71,7 @@ def with_carrier_clocks(
 ) -> tuple[Model, Fit, CarrierClocks]:
     """Return the model whose carriers' clocks fit best, its fit, and the clocks.
 
-    - `given`: measurements as recorded, those of the model with clocks that are right.
+    - `given`: measurements as recorded; the model has them with corrected clocks.
     - `before`: clocks of the model. Without them a search with few samples comes first.
     - `length`: length of the cables [m].
     """
@@ -108,7 +108,7 @@ def with_carrier_clocks(
 
 
 class _Recorded:
-    """Measurements as recorded, from which those of moving carriers can be read at shifted times."""
+    """Measurements as recorded, from which poses of moving carriers can be read at shifted times."""
 
     def __init__(self, robot: Robot, given: Measurements):
         times, poses = given.times, given.carrier_poses

@@ -49,7 +49,7 @@ def begin_with_clock(model: Model, length: float) -> State:
 
 
 def is_still(measurements: Measurements) -> bool:
-    """Return whether the readings hardly change, as those of locked winches."""
+    """Return whether the readings hardly change, as with locked winches."""
     return float(measurements.lengths.std(axis=0).max()) < WINDING * measurements.sigma.lengths
 
 

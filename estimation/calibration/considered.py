@@ -33,8 +33,8 @@ def usual_error(model: Model) -> float:
 def considered(model: Model, state: State, inverse: np.ndarray) -> np.ndarray:
     """Return the covariance that errors of fixed cable ends add, (p, p), in the order and units of the parameters.
 
-    These errors are those of the file's `uncertainty`, or the usual ones of ends that it does not contain, and those of
-    thrusts from which tensions were computed. For parameters of the geometry only errors of anchors that stand count:
+    These errors are the file's `uncertainty`, the usual errors of ends that it does not contain, and errors of thrusts
+    from which tensions were computed. For parameters of the geometry only errors of anchors on carriers at rest count:
     it is estimated relative to the attachments, but forces are not relative to anything.
 
     - `inverse`: pseudo-inverse of the normal matrix of the free parameters, in metres, (p, p).

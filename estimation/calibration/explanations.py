@@ -21,7 +21,7 @@ SIGNIFICANT, TOLD_APART = 6.0, 5.0  # standard deviations by which one conventio
 BY_CHANCE = 3.0  # standard deviations by which the squares of noise may exceed what was stated
 LONG_TAIL = 4.0  # median sizes; differences beyond are wrong readings
 HOPELESS = 2.0  # a convention is rejected if the roughness is so many times larger
-OTHER_FACTOR, SAME_FACTOR = 0.1, 0.01  # from 1, and from those of units
+OTHER_FACTOR, SAME_FACTOR = 0.1, 0.01  # difference of a factor from 1, and from the factor of a unit
 
 
 class Way(NamedTuple):

@@ -5,7 +5,7 @@ depends on how far they are from the true ones, which the others of their change
 file's errors, and v_k of the fit's along principal axis k, the change c_k has the variance s^2 + v_k. A log determines
 few axes, so s^2 remains uncertain. With Jeffreys' prior for s^2, errors of the rigid motion have a distribution with
 long tails (of Student, with as many degrees of freedom as axes, where v_k is small). The prior is the normal
-distribution whose 95 % ellipsoid is that of these errors.
+distribution whose 95 % ellipsoid is the ellipsoid of these errors.
 """
 
 from collections.abc import Mapping
@@ -27,7 +27,7 @@ def loose(length: float, groups: tuple[str, ...], prior: Mapping[str, float]) ->
 
 
 def errors_of_file(solved: Solved, prior: Mapping[str, float]) -> dict[str, float]:
-    """Return standard deviations with those of the file's errors, from a fit with `loose` ones in place of them."""
+    """Return the model's prior with standard deviations of the file's errors, from a fit with a `loose` prior."""
     of, result = solved.model.parameters, dict(solved.model.prior)
     covariance, change = covariance_of(solved), (solved.fit.state.x - of.first)[of.varies]
     for name in set(solved.model.prior) - set(prior):

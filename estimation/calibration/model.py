@@ -60,7 +60,7 @@ class Model(Displayed):
     forces: Balance | None = None  # forces of the measurements; default: computed
     weighs: bool = False  # True if the balance of forces is part of the fit whatever the parameters are
     felt: FeltTensions | None = None  # tensions that stretch the cables; default: the measured ones, without errors
-    ahead: float = 0.0  # clock offset of the platform's accelerations, near that of its poses [s]
+    ahead: float = 0.0  # clock offset of the platform's accelerations, near the one of its poses [s]
     interpolates: bool = False  # True if poses between measured ones are known, as with a track
     # measured poses of the carriers over time; default: those of the measurements, without a clock offset
     carriers: CarrierMotion | None = None
@@ -97,7 +97,7 @@ class Model(Displayed):
 
     @cached_property
     def prior_sigmas(self) -> np.ndarray:
-        """Return the standard deviations of the parameters about those of the file, (P,); inf: none."""
+        """Return the standard deviations of the parameters about the file's values, (P,); inf: none."""
         return prior_sigmas(self.parameters, self.prior)
 
     @cached_property
@@ -126,7 +126,7 @@ class Model(Displayed):
         return self._forces if wanted and self._forces.equations.any() else None
 
     def only(self, rows: np.ndarray | slice) -> Model:
-        """Return the model of some samples (k,) that rise, whose motion is that of all."""
+        """Return the model of some samples (k,) that rise, with the motion of all."""
         samples = np.arange(len(self.measurements))[rows]
         slips = tuple((cable, int(np.searchsorted(samples, first))) for cable, first in self.parameters.slips)
         return replace(

@@ -47,9 +47,9 @@ class Motion(NamedTuple):
     is_known: bool = True
 
     def ahead(self, times: np.ndarray | None, clock: float, rows: np.ndarray | slice) -> Motion:
-        """Return the motion at some samples, with that of the platform `clock` [s] later; its ends stay as they are.
+        """Return the motion at some samples, with the platform's motion `clock` [s] later; its ends stay as they are.
 
-        `times` (N,) [s] are those of all samples.
+        `times` (N,) [s] are the times of all samples.
         """
         moved: dict[str, Any] = {}
         for name in ("gravity", "rate", "spin", "turning"):
@@ -113,7 +113,7 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
 
 
 def _seems_to_move(robot: Robot, measurements: Measurements) -> bool:
-    """Return whether successive positions are close to each other and turn slowly, as only those of a motion do."""
+    """Return whether successive positions are close to each other and turn slowly, as only in a motion."""
     position, _, known = measured_poses(robot, measurements)
     if len(position) < FEWEST_MOVING or not known[:, robot.dof_mask > 0].all():
         return False
@@ -123,7 +123,7 @@ def _seems_to_move(robot: Robot, measurements: Measurements) -> bool:
 
 
 def _filled(times: np.ndarray, values: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Return values (N, d), quaternions of one sign, with those of samples without a pose between their neighbours."""
+    """Return values (N, d), quaternions of one sign; values without a pose are between their neighbours."""
     from scipy.interpolate import CubicSpline
 
     seen = continuous(values[known]) if values.shape[1] == 4 else values[known]

@@ -1,4 +1,4 @@
-"""`NormalEquations`: those of parameters alone, from which every pose has been eliminated (Schur complement).
+"""`NormalEquations`: normal equations of the parameters alone, all poses being eliminated (Schur complement).
 
 With J and G the derivatives of all residuals by parameters and by the pose of each sample, C_k = G_k' G_k of sample k
 (6, 6) and E_k = G_k' J_k, the parameters' equations are
@@ -296,7 +296,7 @@ def pose_covariances_by_file(model: Model, state: State) -> np.ndarray:
     uncertain = model.robot.uncertainty
     if uncertain is None or not model.poses_vary.any():
         return np.zeros((len(state.shift), 6, 6))
-    whole = replace(model, parameters=Parameters(model.robot, tuple(COLUMNS)[:6]))  # those of geometry
+    whole = replace(model, parameters=Parameters(model.robot, tuple(COLUMNS)[:6]))  # parameters of the geometry
     equations, scale = NormalEquations.at(whole, state, metric(whole)), metric(whole)
     assert equations.inverse_root is not None
     assert equations.Y is not None

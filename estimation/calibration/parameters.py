@@ -5,7 +5,7 @@ The vector x has fifteen numbers for each cable, in this order, then eighteen of
     anchor x y z  attachment x y z  offset  scale  radius  build-up  compliance  capstan  friction  gain  zero
     clock  mass  com x y z  frame: shift x y z, turn x y z  body: shift x y z, turn x y z  common compliance
 
-Frame and body are the changes of measured poses in `pose_frames`. The common compliance adds to that of each cable.
+Frame and body are the changes of measured poses in `pose_frames`. The common compliance adds to each cable's own.
 
 With the measured tension y of a cable and the sign s of its speed (1: paid out), the platform feels the tension
 exp(capstan s) gain (y - zero) + friction s, and compliance is 1 / (E A).

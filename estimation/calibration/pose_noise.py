@@ -1,7 +1,7 @@
 """`seeming_information`: what the noise of unknown poses seems to tell of the parameters, and `steadied` against it.
 
 A platform that never turns, for example, does not tell how its attachments are turned. Its estimated orientations
-differ by their noise, though, and the derivatives at them by parameters differ like those of a platform that turns.
+differ by their noise, though, so derivatives by parameters differ between them as if the platform turned.
 With sigma points q + c_j, where the c_j add up to zero and all c_j c_j' to the covariance of an estimated pose q, the
 normal matrix S of such derivatives exceeds the one at the true poses by
 

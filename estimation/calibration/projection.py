@@ -21,7 +21,7 @@ class Part(NamedTuple):
     """Some samples of a log: residuals of their readings, (m, n), and derivatives.
 
     - `scale`: `metric` of the whole log, (P,).
-    - `inverse_root`, `Y`: those of the `NormalEquations`, (n, 6, 6) and (n, 6, p), or None if no pose varies.
+    - `inverse_root`, `Y`: as in `NormalEquations`, (n, 6, 6) and (n, 6, p), or None if no pose varies.
     """
 
     rows: slice
@@ -92,7 +92,7 @@ def out_of_plane(model: Model, state: State, root: np.ndarray) -> np.ndarray:
 
     At a distance h from the plane, a cable of length l is longer by h^2 / 2l, which derivatives at h = 0 do not show.
     With sigma s of h, 95 % of (h, h^2) are in an ellipse about 0 with variances s^2 and 6.9 s^4, as the 95 % limits of
-    one and two degrees of freedom show: 3.84 + 3.84^2 / 6.9 = 5.99. The root is that of the parameters' covariance.
+    one and two degrees of freedom show: 3.84 + 3.84^2 / 6.9 = 5.99. The root is taken of the parameters' covariance.
     """
     rows = normal_rows(model.parameters)
     heights = ((rows[:, model.parameters.varies] @ root) ** 2).sum(axis=1)

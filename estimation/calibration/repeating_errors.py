@@ -1,8 +1,8 @@
 """`repeating`: errors of lengths that repeat with the pose, as of pulleys or layers on drums that the model lacks.
 
 More samples do not average such errors. Their covariance is taken to be a function of the distance of two poses, or of
-two lengths of a cable (Matern, 3/2). Its variance and its reach are those of the largest restricted likelihood of the
-residuals, as parameters absorb a part of the errors: where they may absorb most of them, these may be large.
+two lengths of a cable (Matern, 3/2). Its variance and its reach maximise the restricted likelihood of the residuals,
+because parameters absorb a part of the errors: where they may absorb most of them, these may be large.
 
 Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eq. 4.17; Harville, JASA 72 (1977) 320.
 """
@@ -30,7 +30,7 @@ class Repeating(NamedTuple):
     """Errors that repeat.
 
     Attributes:
-        sigma: Their standard deviation, in that of the residuals of lengths.
+        sigma: Their standard deviation, over the standard deviation of the residuals of lengths.
         of_lengths: Whether they repeat with the cables' lengths rather than with the pose.
         information: What they add to the covariance of J'e times a root of the parameters' covariance, (r, r), with
             residuals of standard deviation 1.

@@ -336,7 +336,7 @@ class CalibrationData(Displayed):
 
     @property
     def carrier_clocks(self) -> tuple[Parameter, ...]:
-        """Return by how much the clock of each carrier is ahead of that of the poses [s], if that was estimated."""
+        """Return by how much the clock of each carrier is ahead of the poses' clock [s], if that was estimated."""
         clocks = self._solved.clocks
         if clocks is None:
             return ()

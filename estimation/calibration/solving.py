@@ -278,7 +278,7 @@ def model_of(
 ) -> Model:
     """Return the model of checked arguments, which starts with level poses where none are measured.
 
-    `track` is that of a model with the same poses, which needs as much memory as the log. `weights` are those of
+    `track` belongs to a model with the same poses, which needs as much memory as the log. `weights` are those of
     `Model`; default: of all readings but those of `left_out`. `near` is a fit of the same log: its parameters tell the
     tensions of a platform that `hangs` better than the file's, and so which cables are slack.
     """

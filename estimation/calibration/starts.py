@@ -43,8 +43,8 @@ def fit_from(
     """Minimise the sum of squares, from level poses if none were measured; `length` is the length of the cables [m].
 
     It returns the fit, and the model with its weights of readings and the directions that it keeps. With `outliers`,
-    readings that do not fit those of most are excluded, because parameters and poses that adapt to them would hide
-    them. `enough` is that of `fit`. The state has initial parameters, and the poses of `model.begin()`.
+    readings that do not fit most others are excluded, because parameters and poses that adapt to them would hide
+    them. `enough` is as in `fit`. The state has initial parameters, and the poses of `model.begin()`.
     """
 
     def cleaned(of: Model, state: State, softest: float = np.inf) -> tuple[State, np.ndarray]:

@@ -27,7 +27,7 @@ Signals = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
 LARGEST_DRIFT, USUAL_DRIFT = 0.01, 1e-4
 JUMP, MOST_JUMPS = 5.0, 4  # usual steps, from which on a gap may be a jump of the clock, and how many are looked at
 NO_JUMP = 0.5  # of what poses leave unexplained: less is left once a jump is taken out
-CORRELATED = 5.0  # by which the errors of a model exceed those of as much noise
+CORRELATED = 5.0  # factor of errors of a model over errors due to noise of the same size
 
 
 class ClockJumpError(InputError):

@@ -35,7 +35,7 @@ def filled(times: np.ndarray | None, samples: Samples, field: Field) -> np.ndarr
 def _plausible(robot: Robot, thrusts: np.ndarray, names: Sequence[str], notes: list[str]) -> np.ndarray:
     """Return thrusts (N, c) [N], nan of carriers that they could not hold up, or that fly without any load.
 
-    `names` are those of their fields, for a map.
+    `names` are the names of their fields, for a map.
     """
     result, gravity = thrusts.copy(), float(np.linalg.norm(robot.gravity))
     # In hover all thrusts together hold all weights, which gives the unit of those from 0 to 1.

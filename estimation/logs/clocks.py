@@ -72,7 +72,7 @@ def clock_of_poses(
 def aligned(
     lengths: Samples, pose: Samples, robot: Robot, given: LogMap | None, of_poses: Sequence[Recording]
 ) -> Clock:
-    """Return the clock of poses in other recordings, which have those of moving carriers too.
+    """Return the clock of poses in other recordings, which have poses of moving carriers too.
 
     `pose` is of positions (N, 3) [m], followed by quaternions (N, 4) where orientations were recorded.
     """

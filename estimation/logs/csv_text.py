@@ -123,7 +123,7 @@ def _one_header(text: str) -> str:
 def _rows_of_names(lines: list[str], table: list[list[str]], width: int) -> list[list[str]] | None:
     """Return the rows of names above the numbers, of which each has `width` columns; None if no row has so many.
 
-    Names that are commented out, as those of `numpy.savetxt`, are names if no others are above the numbers.
+    Names that are commented out, as `numpy.savetxt` writes them, are names if no others are above the numbers.
     """
     begin = max((k + 1 for k, line in enumerate(lines) if line.startswith(LABVIEW)), default=0)
     above = [(_cut(row, width), line[:1] == "#") for row, line in zip(table[begin:], lines[begin:], strict=True)]

@@ -29,7 +29,7 @@ def readings_of(robot: Robot, lengths: np.ndarray) -> np.ndarray:
 
 
 def locked(lengths: np.ndarray, most: float = LOCKED) -> bool:
-    """Return whether readings (N, m) hardly change, by a share `most` of their size, as those of locked winches."""
+    """Return whether readings (N, m) hardly change, by a share `most` of their size, as with locked winches."""
     known = lengths[np.isfinite(lengths).all(axis=1)]
     return len(known) > 1 and bool((np.ptp(known, axis=0) <= most * np.abs(known).max(axis=0)).all())
 

@@ -25,7 +25,7 @@ class Field(NamedTuple):
 
     @property
     def full(self) -> str:
-        """Return the name with that of its topic, as a message names it."""
+        """Return the name with its topic's name, as a message gives it."""
         return plain(self.topic.full(self.name))
 
     @property

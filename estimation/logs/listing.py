@@ -130,7 +130,7 @@ def report(data: dict[str, Any]) -> Report:
         ]
         columns = ("topic", "type", "samples", "rate", "duration", "gaps")
         lost = [pair for topic in one["topics"] for pair in topic["empty"].items()]
-        empty = [f"lines without {name}: {quantity(count)}" for name, count in lost]
+        empty = [f"lines with missing {name}: {quantity(count)}" for name, count in lost]
         parts += [Table(f"{one['file']}: {one['kind']}", columns, rows, (2, 3, 4)), *empty, *one["notes"]]
         parts.append(Section("Fields", [(topic["topic"] or "columns", _names(topic)) for topic in one["topics"]]))
     if data["problem"]:

@@ -64,7 +64,7 @@ def read_map(path: str | os.PathLike[str]) -> LogMap:
 
 
 def free_axes(robot: Robot | None) -> str:
-    """Return the coordinates that can move, between spaces; those of a planar robot suffice in a log."""
+    """Return the coordinates that can move, between spaces; a planar robot's log needs no others."""
     return "" if robot is None else " ".join(np.array(COORDINATES)[robot.dof_mask > 0])
 
 
@@ -150,7 +150,7 @@ def listed(recordings: Sequence[Recording], but: Sequence[Fields] | None = None)
 
 
 def _times(recordings: Sequence[Recording], given: LogMap | None) -> tuple[Field, ...]:
-    """Return the times of all tables: that of the map, and the usual ones of tables that have none from there."""
+    """Return the times of all tables: from the map, or by usual names for tables that it does not give."""
     named = _named(recordings, "time", given) if given else ()
     usual = usual_fields(_everything(recordings), "time", None, ())
     return (*named, *(one for one in usual if all(one.topic is not other.topic for other in named)))

@@ -12,10 +12,10 @@ HANGS = 0.5  # of the height of carriers above the load at home: less is a load 
 
 
 def ned_frame(robot: Robot, poses: np.ndarray | None, carriers: np.ndarray) -> str | None:
-    """Return the axis of x of {G} by which poses in a frame of north, east, down are those of a team, or None.
+    """Return where x of {G} points if the poses of a team are in a frame of north, east, down; otherwise None.
 
     Cables cannot push, so a load cannot be above all carriers that move, unless their frames are below it at home too,
-    as those of vehicles with masts. Without a position of the load, carriers below the origin that are above it at home
+    as with vehicles with masts. Without a position of the load, carriers below the origin that are above it at home
     are in such a frame. Which axis it is follows from the home poses.
 
     - `poses`: of the platform, (N, 6) [m, rad], nan where not measured.

@@ -72,7 +72,7 @@ class PoseTrack:
     def at(self, clock: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return position (N, 3) [m], rotation (N, 3, 3), velocity (N, 3) [m/s] and rate (N, 3) in {G} [rad/s].
 
-        `clock` is the time by which the clock of the poses is ahead of that of the lengths [s].
+        `clock` is the time by which the clock of the poses is ahead of the lengths' clock [s].
         """
         if self._last is None or self._last[0] != clock:
             times = np.clip(self._times + clock, *self._span)

@@ -45,7 +45,7 @@ class Log(NamedTuple):
         notes: Remarks on files and clocks, one line each.
         begin: Reading of the lengths' clock at time 0 of the measurements [s].
         recordings: The files.
-        clock: Clock of the poses, if it differs from that of the lengths.
+        clock: Clock of the poses, if it differs from the lengths' clock.
         ned: Direction of the x axis of {G}, if poses were converted from a frame of north, east, down.
         pulls: Pulls of carriers at their cables by thrusts, in {G}, (N, m, 3) [N], if these give the tensions.
     """

@@ -40,7 +40,7 @@ class Topic:
     read: Callable[[Sequence[str]], Samples]
 
     def full(self, name: str) -> str:
-        """Return the name of a field with that of its topic."""
+        """Return the name of a field with its topic's name."""
         return f"{self.name}/{name}" if self.name else name
 
 
@@ -54,7 +54,7 @@ class Recording:
         sigma: Standard deviations that the file states, by the names of `Sigma`.
         framed: Frames of its poses that are known roughly, as in `Measurements`.
         notes: Remarks about the file, such as that its end is missing.
-        ahead: Time by which its clock is ahead of that of the poses [s], which is found when several files are read
+        ahead: Time by which its clock is ahead of the poses' clock [s], which is found when several files are read
             together.
     """
 

@@ -57,8 +57,8 @@ class Polynomials:
     """Polynomials of a degree by least squares through `width` neighbours of each sample, at times (N,) [s].
 
     Samples before and after a pause are no neighbours, unless those between two pauses are too few for a polynomial.
-    If `fading`, farther neighbours count less (Hann window). They are computed for some samples at a time: those of a
-    million samples would take more than a gigabyte.
+    If `fading`, farther neighbours count less (Hann window). They are computed for some samples at a time, because
+    those of a million samples would take more than a gigabyte.
     """
 
     def __init__(self, times: np.ndarray, width: int, degree: int = 2, fading: bool = False):

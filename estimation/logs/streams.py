@@ -30,7 +30,7 @@ class Reader:
             self._of.setdefault(id(one.topic), []).append(one.name)
 
     def stream(self, fields: Sequence[Field]) -> Samples:
-        """Return fields in SI units, those of other topics at the times of the first one's.
+        """Return fields in SI units; fields of other topics are interpolated at the times of the first one.
 
         Raises `InputError` if a number is so large that only damage explains it.
         """

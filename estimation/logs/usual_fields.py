@@ -179,7 +179,7 @@ def _preferred(
 
 
 def _of_direction(which: str) -> tuple[int, int]:
-    """Return the number of the cable, 0 if there is none, and that of the axis."""
+    """Return the number of the cable, 0 if there is none, and the number of the axis."""
     *number, axis = which.split()
     return int(number[0]) if number else 0, OF_DIRECTION.index(axis)
 

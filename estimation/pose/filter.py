@@ -1,8 +1,8 @@
 """`PoseFilter`: pose and velocity of a moving platform from a stream of measurements (extended Kalman filter).
 
 The state is the position p, the rotation R, velocity v, angular velocity w, and the linear and angular acceleration
-beside those of a reference, all in {G}; the last two change by white jerk. With a reference it is thus a filter of the
-error to the reference, whose bandwidth may be far below that of the motion. Errors are (p, small rotation, v, w, a,
+in addition to a reference's, all in {G}; the last two change by white jerk. With a reference it thus filters the error
+to the reference, and its bandwidth may be far below the motion's. Errors are (p, small rotation, v, w, a,
 alpha) and, once an inertial sensor is used, the biases of its rates and accelerations.
 """
 
@@ -196,7 +196,7 @@ class PoseFilter(Displayed):
         return MotionEstimate(self._time, pose, velocity, twist, self._P[:12, :12].copy(), self._left_out)
 
     def _begin(self, lengths: np.ndarray | None, pose: np.ndarray | None, carriers: np.ndarray) -> None:
-        """Start at a measured pose, or at that of lengths, with unknown velocities."""
+        """Start at a measured pose, or at the pose of the lengths, with unknown velocities."""
         if pose is None and (lengths is None or np.isnan(lengths).any()):
             raise InputError("lengths or pose must be given in full for the first update, got neither")
         sigma, size = self._sigma, self.robot.length

@@ -97,7 +97,7 @@ def one_pose(lengths: ArrayLike, carrier_pose: ArrayLike | None, robot: Robot) -
     """Return the lengths (m,) and carriers (c, 6), or None, of one pose, or raise InputError."""
     measured, carriers = checked_lengths(lengths, robot), None
     if measured.ndim != 1:
-        raise InputError(f"lengths must have the shape ({robot.m},), those of one pose, got {shown(measured)}")
+        raise InputError(f"lengths must have the shape ({robot.m},), for one pose, got {shown(measured)}")
     if carrier_pose is not None:
         carriers = _poses("carrier_pose", carrier_pose, (len(robot.carriers), 6))
         if carriers.ndim != 2:

@@ -36,8 +36,8 @@ _PARAMETERS = (
 class Variable(NamedTuple):
     """A variable of type Float64.
 
-    Its causality is that of FMI, its `place` a member of `towline_unit`, and `least` the smallest value that it can be
-    set to; nan: any, also none, as from a sensor.
+    Its causality is a term of FMI, its `place` a member of `towline_unit`, and `least` the smallest value that it can
+    take; nan: any, also none, as from a sensor.
     """
 
     name: str

@@ -14,7 +14,7 @@ class Costs(NamedTuple):
     mechanics: int  # operations without sines and cosines
     sines: int  # and cosines
     free: int  # operations of a step whose tensions reach no limit, mechanics included
-    soft_free: int  # operations of a step with a soft solution, without those of iterations
+    soft_free: int  # operations of a step with a soft solution, not counting iterations
     outer: int  # operations of an outer iteration of an exact solution at full rank
     inner: int
     soft_outer: int
@@ -79,7 +79,7 @@ class _Solve(NamedTuple):
 
     @property
     def outer(self) -> int:
-        """Return the operations of an outer iteration, less those of its inner ones."""
+        """Return the operations of an outer iteration, not counting its inner ones."""
         scan = (6 if self.k <= 2 else 2) * self.columns
         return scan + 40 if self.k <= 2 else scan
 

@@ -103,7 +103,7 @@ class ElementChain(Displayed):
     def node_forces(self, displacements: Any, winding: float = 0.0) -> np.ndarray:
         """Return the increments of the forces that hold each node [N], (n + 1, 3): K_n dX + K_l dE.
 
-        `displacements` are those of the nodes [m], (n + 1, 3); `winding` is de [m], the additional elongation of each
+        `displacements` belong to the nodes [m], (n + 1, 3); `winding` is de [m], the additional elongation of each
         element, its share of the cable that the winch did not pay out.
         """
         # An element that would have to push loses what it had.

@@ -35,7 +35,7 @@ class Audit(Displayed):
     motion: Motion  # of the platform in {G}, at `times`
     carriers: Motion  # likewise
     tensions: np.ndarray  # the audited ones, (n, m) [N]; where none exist nan, or near singular poses the closest
-    tensions_unlimited: np.ndarray  # those of least norm without limits, (n, m) [N]; negative: the cable would push
+    tensions_unlimited: np.ndarray  # of least norm without limits, (n, m) [N]; negative: the cable would push
     # Distance of the required wrench from the available wrench set, (n,) [N], the largest from each time to the next;
     # rounding errors where tensions exist.
     violation: np.ndarray
@@ -90,7 +90,7 @@ class Audit(Displayed):
 
 
 def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False) -> Audit:
-    """Audit the motion of `deviation`, or that of the references alone.
+    """Audit the motion of `deviation`, or the references alone.
 
     One that is known to be infeasible and only `to_show` is audited at the output times, without its drift. Raises
     `InputError` if a cable has zero length somewhere.

@@ -1,9 +1,9 @@
 """Bound distances between the instants of an audit, however fast the motion is: `came_too_near`.
 
-A plane between two bodies, known at one instant, proves a distance at each other one: that of the points of both from
-it. It is exact where they moved straight on, and lower where they turned about each other. Both planes of two instants
-bound the distance in between, less what the points leave the straight line by. Where that does not decide, the instant
-in the middle is looked at, and so on: a distance that is too small by more than the limit's tolerance is found.
+A plane between two bodies, known at one instant, proves a distance at each other one: the distance of the points of
+both from it. It is exact where they moved straight on, and lower where they turned about each other. Both planes of two
+instants bound the distance in between, less what the points leave the straight line by. Where that does not decide, the
+instant in the middle is looked at, and so on: a distance that is too small by more than the limit's tolerance is found.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ class _Ends(NamedTuple):
 
 
 def _least(audited: Instants, limit: Distance, values: np.ndarray, holds: np.ndarray, found: _Least) -> _Least:
-    """Return the smallest distance over all time if it is too small, else one that is not; `found` is that of `values`.
+    """Return the smallest distance over all time if it is too small, else one that is not; `found` is as in `values`.
 
     `holds` is at which instants the limit holds, (n,). Wherever the distance may be too small, and less than the
     smallest so far, the instant in the middle is looked at.

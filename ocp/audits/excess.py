@@ -26,8 +26,8 @@ class Excess(Displayed):
     unit: str  # unit of value and bound
     accepted: Literal["at most", "at least", "exactly"] = "at most"  # side of the bound on which the value must be
     why: str = ""  # explanation; may be empty
-    what: str = ""  # what the value is, if it is not that of the limit: "distance from its path"
-    # The value with which the program would keep the limit, if that is another: that of a distance has no least, but a
+    what: str = ""  # what the value is, if it is not the limited quantity: "distance from its path"
+    # The value with which the program would keep the limit, if it is another: a distance has no least value, but a
     # thin region is nowhere deep. It is the bound where a tighter one at the nodes would not help.
     between: float | None = None
 
@@ -35,7 +35,7 @@ class Excess(Displayed):
     def of(cls, limit: Limit, which: int, time: float, value: float, why: str = "") -> Self:
         """Return the excess of one value of a limit, `which`, over the bound that it is beyond.
 
-        If both bounds have one size, as those of a speed, it is the size of the value that must be at most the bound.
+        If both bounds have one size, as for a speed, it is the size of the value that must be at most the bound.
         """
         side, bound = ("at least", limit.low) if value < limit.low else ("at most", limit.high)
         if limit.is_equation:

@@ -122,7 +122,7 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
 def limited(
     scenario: Scenario, times: np.ndarray, motion: Motion, carriers: Motion, values: list[np.ndarray]
 ) -> list[np.ndarray]:
-    """Return the values of `Instants` with those of distances."""
+    """Return the values of `Instants`, distances included."""
     return [
         np.where(scenario.in_force(limit, times)[:, None], scenario.limits.distances(limit, motion, carriers), np.nan)
         if isinstance(limit, Distance)

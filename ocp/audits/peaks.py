@@ -121,9 +121,10 @@ def _may_exceed(
 def _may_be_short(seen: Instants, jumps: np.ndarray) -> np.ndarray:
     """Return between which instants there may be no tensions inside their limits, (n - 1,).
 
-    Tensions between those of two instants are inside their limits, since these are convex. What their wrench misses is
-    bounded by its curvature, and is nothing if it is small, or if all cables together can make up for it from what they
-    have left to their limits. Where they have not, other tensions of the same instants, far from their limits, may.
+    Tensions interpolated between two instants are inside their limits, since these are convex. What their wrench misses
+    is bounded by its curvature, and is nothing if it is small, or if all cables together can make up for it from what
+    they have left to their limits. Where they have not, other tensions of the same instants, far from their limits,
+    may.
     """
     resting = seen.scenario.phases.resting(seen.times)
     doubtful = ~(resting[1:] & resting[:-1]) & ~jumps
@@ -142,7 +143,7 @@ def _may_be_short(seen: Instants, jumps: np.ndarray) -> np.ndarray:
 
 
 def _misses(seen: Instants, jumps: np.ndarray, among: np.ndarray) -> np.ndarray:
-    """Return `among` which spans (n - 1,) the tensions between those of two instants miss more than cables make up for.
+    """Return `among` which spans (n - 1,) tensions interpolated between two instants miss more than cables make up for.
 
     With the tensions t of an instant, A t - w is known there and at the instants before and after, which shows how it
     is bent. The tensions change in between too, and A with them.

@@ -14,7 +14,7 @@ HALVINGS = 5
 def shortest_shifts(scenario: Scenario, size: float, holds: Callable[[np.ndarray], bool]) -> Iterator[np.ndarray]:
     """Yield the shortest shift (3,) [m] along each axis and direction that `holds`, the shortest of all first.
 
-    `size` is that of the robot [m].
+    `size` is the robot's size [m].
     """
     ways = [sign * np.eye(3)[axis] for axis in POSITION if scenario.robot.dof_mask[axis] for sign in (1, -1)]
     for far in SHIFTS * size:

@@ -126,7 +126,7 @@ class Space(Displayed):
 
     @cached_property
     def _shares(self) -> np.ndarray:
-        """Return the share of each attachment in the middle of those of a loose carrier, (k, m)."""
+        """Return the weight of each attachment in the mean of the attachments of a loose carrier, (k, m)."""
         own = self.scenario.robot.carrier_of_cable == np.array(self.scenario.loose)[:, None]
         return own / own.sum(axis=1, keepdims=True)
 
@@ -138,7 +138,7 @@ class Space(Displayed):
 
     @cached_property
     def size(self) -> float:
-        """Return the largest distance of what moves from the platform's origin, or a part of that of the ends [m]."""
+        """Return the largest distance of what moves from the platform's origin, or part of the ends' distance [m]."""
         robot, ends = self.scenario.robot, self.references[0][:, :3]
         points = np.vstack([robot.attachments, robot.platform.com, self.scenario.body_corners, *self.offsets])
         least = SMALL * float(np.linalg.norm(ends[1] - ends[0]))

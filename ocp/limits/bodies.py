@@ -1,6 +1,6 @@
 """Limits of distances of convex bodies that move with the platform: from regions, from the floor, in a room.
 
-Two bodies are apart if no edge of one meets the other, and their distance is the least of those of the edges of each
+Two bodies are apart if no edge of one meets the other, and their distance is the least distance of the edges of each
 from the other. Bodies with the same skeleton but round edges are nearer by their radii.
 """
 

@@ -40,7 +40,7 @@ class SomeCables(EachCable):
 
     @classmethod
     def each(cls, robot: Robot, bounds: Sequence[float | None]) -> Iterator[Self]:
-        """Yield a limit for each different bound among those of all cables, (m,), which may be missing."""
+        """Yield a limit for each different bound of the cables, (m,), which may be missing."""
         for most in dict.fromkeys(bounds):
             if most is not None:
                 yield cls(robot, most, [cable for cable, its in enumerate(bounds) if its == most])

@@ -1,7 +1,7 @@
 """Distances of points and cables from convex polyhedra, as expressions that a nonlinear program can differentiate.
 
 Which face, edge or end is nearest is decided by comparisons, which have no derivatives. The distance then is a formula
-of that one alone, so that its derivatives cost no more than those of two lines, however many faces there are.
+of that one alone, so its derivatives cost no more than for two lines, however many faces there are.
 """
 
 from functools import lru_cache

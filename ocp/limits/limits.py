@@ -31,7 +31,7 @@ class Separating(NamedTuple):
 
     moving: int  # how many points the first body of each pair has
     pairs: int  # how many there are
-    points: ca.Function  # of the motions of platform and carriers, (18,) each: those of all pairs, one after the other
+    points: ca.Function  # of the motions of platform and carriers, (18,) each: points of all pairs, one after the other
     plane: ca.Function
 
 
@@ -105,7 +105,7 @@ class Limits(Displayed):
 
     @cached_property
     def places(self) -> list[slice]:
-        """Return where among all values those of each limit are."""
+        """Return which of all values belong to each limit."""
         ends = np.cumsum([0, *(its.numel() for its in self._values)]).tolist()
         return [slice(*pair) for pair in pairwise(ends)]
 

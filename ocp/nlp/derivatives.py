@@ -125,7 +125,7 @@ class Block(NamedTuple):
 
 
 class _Entries(NamedTuple):
-    """Entries of a sparse matrix, in which those of the same place add up."""
+    """Entries of a sparse matrix, in which entries at the same place add up."""
 
     values: ca.MX
     rows: np.ndarray
@@ -191,7 +191,7 @@ class Columns:
     - `references`: the reference motions at all points, (18 (1 + c), points), as numbers or parameters.
     - `carried`: loads and columns of the ground, (., nodes).
     - `intervals`: `Grid.intervals`, (2, steps), as numbers or parameters.
-    - `duration`: that of the references [s].
+    - `duration`: duration of the references [s].
     """
 
     def __init__(

@@ -87,7 +87,7 @@ class _References:
 
 
 def _across(platform: Motion) -> np.ndarray:
-    """Return the horizontal direction across the platform's velocity; at rest, that of the nearest moving point."""
+    """Return the horizontal direction across the platform's velocity; at rest, the one at the nearest moving point."""
     velocity = platform.velocity[:, :2]
     speed = np.linalg.norm(velocity, axis=1)
     moving = np.flatnonzero(speed > 1e-3 * max(speed.max(), 1e-9))
@@ -114,7 +114,7 @@ def _span(scenario: Scenario) -> np.ndarray:
 
 
 def _tried(shape: np.ndarray, span: np.ndarray, attempt: int) -> np.ndarray:
-    """Return formations (k, tries, 4) to try about those of `shape` (k, 4): first all over the span, then near them."""
+    """Return formations (k, tries, 4) to try about `shape` (k, 4): first all over the span, then near them."""
     step = span * np.where(TWO_SIDED, 2.0, 1.0) / (np.array(TRIES) - 1)
     if attempt == 0:
         levels = [
@@ -150,7 +150,7 @@ def _placed(scenario: Scenario, references: _References, shape: np.ndarray) -> t
 def _beyond(scenario: Scenario, platform: np.ndarray, carriers: np.ndarray, tries: int = 1) -> np.ndarray:
     """Return the sum of the violations of the task's distances by platform (n, 6) and carriers (n, c, 6), (n,) [m].
 
-    So many `tries` in turn are near each other: from the distances of one those of most others are known to suffice.
+    So many successive `tries` are near each other: the distances of one show that those of most others suffice.
     """
     beyond, limits = np.zeros(len(platform)), scenario.limits
     others = limits.along(Motion.still(platform), Motion.still(carriers), distances=False)

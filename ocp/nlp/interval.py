@@ -164,7 +164,7 @@ def _rate_cost(
 ) -> ca.SX | float:
     """Return what rates from point to point cost.
 
-    On the ground those of tensions cost by default, so that the load is taken up over the whole phase.
+    On the ground, rates of tensions cost by default, so that the load is taken up over the whole phase.
     """
     objective, robot = scenario.task.objective, scenario.robot
     changing = [ca.SX(0, 1)] * len(columns)

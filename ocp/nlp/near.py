@@ -36,7 +36,7 @@ class Near(Displayed):
     def along(cls, scenario: Scenario, shares: np.ndarray, motion: Deviation, reach: float) -> Self:
         """Return the points where a region is nearer than its bound and `reach`, of the motion's extent, permit.
 
-        `shares` are those of the motion's duration at the program's points.
+        `shares` are fractions of the motion's duration at the program's points.
         """
         slack, _, extent = _kept(scenario, shares, motion)
         holds = _holds(scenario, shares)

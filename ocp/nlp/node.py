@@ -17,7 +17,7 @@ from .rows import OTHER_COSTS, Mesh, Row, bounded, costs_at, in_world, motions, 
 
 ACCELERATION = 2  # order of a hull: of lower ones an interval has all points, its ends too
 SLACK_COST = 1e2  # of a missing wrench as large as the weight
-SUPPORT_COST = 1e-8  # of the ground's forces in units of the weight: enough to choose among those of spare points
+SUPPORT_COST = 1e-8  # of the ground's forces in units of the weight: enough to choose among forces of spare points
 WIND_COST = 1e-2  # of the tensions in the decisive winds of a box, beside the planned ones
 
 

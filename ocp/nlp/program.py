@@ -160,7 +160,7 @@ def build(
     """Build the nonlinear program of `scenario` on `mesh`, with local limits where they are `near`; default: all.
 
     A `movable` one has the references and the length of the intervals as parameters (`Program.of`). Its ends are not
-    yet known, so that it has no rows of `leaving`. `stages` are those of the scenario and the mesh; default: new ones.
+    yet known, so that it has no rows of `leaving`. `stages` belong to the scenario and the mesh; default: new ones.
     """
     steps, scheme, stages = mesh.steps, scenario.scheme, stages or Stages.of(scenario, mesh, movable)
     layout, grid, node, interval = stages.layout, stages.grid, stages.node, stages.interval

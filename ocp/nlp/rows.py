@@ -95,7 +95,7 @@ def bounded(limit: Limit, values: ca.SX, slack: ca.SX | None) -> tuple[list[ca.S
 
 
 def stretch(layout: Layout, x: Values) -> Values:
-    """Return the duration of column x, relative to that of the references."""
+    """Return the duration of column x, relative to the references' duration."""
     place = layout.at(DURATION)
     return 1.0 if place is None else x[place]
 
@@ -140,7 +140,7 @@ def costs_at(
 ) -> tuple[ca.SX, ca.SX]:
     """Return what costs in column x, and the values whose rates cost, in amounts (`Costs.function`).
 
-    `duration` is that of the references [s], `bodies` are the motions of the platform in {G} and of the carriers,
+    `duration` is the references' [s], `bodies` are the motions of the platform in {G} and of the carriers,
     (18, 1) each.
     """
     force, place = scenario.robot.force_scale, layout.at(MARGIN)
@@ -161,9 +161,10 @@ def in_world(scenario: Scenario, platform: list[ca.SX], carriers: list[list[ca.S
 def swept(scenario: Scenario, mesh: Mesh) -> dict[Limit, ca.Function]:
     """Return the limits that the program keeps between nodes rather than at them, and their functions.
 
-    They are distances from regions that are thinner than a few steps of the reference motion: of teams those of bodies,
-    since a beam under quadrotors jumped over a post on every mesh, but four quadrotors with a point load took four
-    times as long through a slot; of other robots those of points, since a finer mesh finds what a body jumps over.
+    They are distances from regions that are thinner than a few steps of the reference motion: for teams only distances
+    of bodies, since a beam under quadrotors jumped over a post on every mesh, but four quadrotors with a point load
+    took four times as long through a slot; for other robots distances of points, since a finer mesh finds what a body
+    jumps over.
     """
     platform, carriers = scenario.references(scenario.scheme.shares(mesh.steps) * scenario.duration)
     ways = [np.diff(motion.pose[:, POSITION], axis=0) for motion in (platform, *carriers)]

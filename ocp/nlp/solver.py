@@ -35,7 +35,7 @@ MOST_ITERATIONS = 400
 # permutation that scales it would take another tenth less, but short motions of teams are then not found.
 TEAM = {"mumps_pivtol": 1e-4, "mumps_pivot_order": 5}
 # What IPOPT adds to constraints where MUMPS calls their Jacobian singular. The motion of a quadrotor with a slung load
-# follows from that of the load. Only accelerations of the nodes remain, times the square of a step: much less than
+# follows from the load's motion. Only accelerations of the nodes remain, times the square of a step: much less than
 # IPOPT's default, 1e-8, with which each step is far from Newton's. A minimum time took 300 iterations; it takes 36.
 NEARLY_SINGULAR = {"jacobian_regularization_value": 1e-13}
 TIME_LIMIT, SETTLED = "time limit", f"no better by {BETTER:.1%} in {PATIENCE} iterations"  # messages of ours
@@ -156,8 +156,8 @@ class Solver:
         """Solve from `guess`; default: from the last solution and its multipliers, or else from a guess of our own.
 
         A guess is `coarser` if it is the same task's optimum on a coarser mesh. After so many `seconds` IPOPT
-        stops with the best that it has. A run without a solution is a result, not an error. `parameters` are
-        those of the program, if it has any; default: its own. A guess that is `near` the last solution starts
+        stops with the best that it has. A run without a solution is a result, not an error. `parameters` belong
+        to the program, if it has any; default: its own. A guess that is `near` the last solution starts
         with its multipliers. Raises `SolverError` if CasADi or IPOPT break; `KeyboardInterrupt` if an interrupt
         arrives; the solver's thread ends at its next iteration.
         """

@@ -41,7 +41,7 @@ class Stages(Displayed):
 
     @staticmethod
     def of(scenario: Scenario, mesh: Mesh, movable: bool = False, known: Iterable[Stages] = ()) -> Stages:
-        """Return those of a scenario on a mesh, with the functions of `known` ones if they are the same.
+        """Return the stages of a scenario on a mesh, with the functions of `known` ones if they are the same.
 
         With a `movable` one references and lengths of intervals may change.
         """

@@ -4,7 +4,7 @@ If all paths stretch, velocities go with 1/T and accelerations with 1/T^2, so at
 
     w(T) = c + d X,    X = (T_0 / T)^2,
 
-with c that of rest and c + d that of some duration T_0: the dynamics are linear in accelerations and quadratic in
+with the wrench c at rest and c + d for a duration T_0: the dynamics are linear in accelerations and quadratic in
 velocities. The X for which tensions inside their limits exist are then an interval, whose ends two linear programs in
 (t, X) give; a duration must lie in the intervals of all points. Most points do not restrict the interval of those
 before, which tensions at its ends show.

@@ -37,7 +37,7 @@ class Carrier(NamedTuple):
 def too_weak_carriers(scenario: Scenario, times: np.ndarray, platform: Motion, carriers: Motion) -> list[Excess]:
     """Return the shortest duration in which carriers are strong enough, if the task's is shorter, else nothing.
 
-    `platform` and `carriers` have a given motion of the platform at `times` (n,) [s]; that of the carriers is free.
+    `platform` and `carriers` have a given motion of the platform at `times` (n,) [s]; the carriers' motion is free.
     """
     robot, known = scenario.robot, carriers_of(scenario)
     fixed = scenario.relative or scenario.phases.all or scenario.task.wind is not None or not scenario.stretches
@@ -68,7 +68,7 @@ def too_weak_carriers(scenario: Scenario, times: np.ndarray, platform: Motion, c
 
 
 def carriers_of(scenario: Scenario) -> list[Carrier] | None:
-    """Return what bounds the forces of all carriers; None if that of one is not known."""
+    """Return what bounds the forces of all carriers; None if one carrier's bound is not known."""
     found = []
     for carrier in scenario.robot.carriers:
         hard = [limit for limit in scenario.limits if limit.soft is None and carrier.name in limit.labels]

@@ -48,7 +48,7 @@ def drawings(plan: PlanData, trajectory: xr.Dataset) -> dict[str, Drawing]:
 
 
 def limited(plan: PlanData, rows: np.ndarray) -> list[Limited]:
-    """Return the limits of task, robot and carriers at the audit's `rows`, those of one name and bound together."""
+    """Return the limits of task, robot and carriers at the audit's `rows`, limits of one name and bound together."""
     gathered: dict[tuple[str, str, float, float], tuple[list[str], list[np.ndarray]]] = {}
     for limit, values in zip(plan.scenario.limits, plan.audit.limited, strict=True):
         if limit.shown:

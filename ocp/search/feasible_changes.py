@@ -64,7 +64,7 @@ OTHERS = lighter_load, less_wind, nearer_end, less_margin, slower_rate, longer
 
 
 def feasible_changes(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> Offers:
-    """Return changes that make a scenario feasible; `audit` is that of its closest motion, with a `deviation`."""
+    """Return changes that make a scenario feasible; `audit` is its closest motion's, with a `deviation`."""
     return Offers(_changes(search, scenario, deviation, audit), search.cut_short)
 
 
@@ -115,7 +115,7 @@ def _past_what_is_in_the_way(search: Search, scenario: Scenario, audit: Audit) -
 def _farther(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
     """Return changes of regions, path, loads, platform and cables: each alone, or else several together.
 
-    `audit` is that of the motion exactly on the path.
+    `audit` is for the motion exactly on the path.
     """
     chosen = by_programs(scenario)
     fewer = (partial(fewer_regions, audit=audit),) * _blocked(audit)

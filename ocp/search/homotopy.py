@@ -48,7 +48,7 @@ def _slowly(search: Search, mesh: Mesh, start: Deviation | None) -> Deviation | 
         return None
     slow = scenario.held(SLOWER * scenario.duration if span is None else min(SLOWER * scenario.duration, span.max))
     if start is not None:
-        # Nodes as few as those of the mesh: what is sharp between them would tilt carriers as no limit lets them.
+        # As few nodes as the mesh has: what is sharp between them would tilt carriers as no limit lets them.
         nodes = np.linspace(0.0, slow.duration, mesh.steps + 1)
         start = balanced(slow, start.stretched(slow.duration / start.nodes[-1]).at(nodes))
     linear = search.approach(mesh, start, slow)

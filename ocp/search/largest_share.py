@@ -242,7 +242,7 @@ def exceeds(scenario: Scenario, times: np.ndarray, rates: bool = True) -> np.nda
 
 
 def along(scenario: Scenario, path: AnyPath) -> Scenario:
-    """Return the scenario along another path. Where a given state is that of an end of the path, it moves with it."""
+    """Return the scenario along another path. A given state at an end of the path moves with it."""
     times, changes = np.array([0.0, scenario.duration]), dict[str, Any](path=path)
     motion = scenario.along(path, scenario.duration).motion(times, None)[0]
     for row, key in enumerate(("initial", "final")):

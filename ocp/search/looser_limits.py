@@ -39,7 +39,7 @@ class Bound(NamedTuple):
 
 
 def looser_limits(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> list[Relaxed]:
-    """Return looser bounds of limits with which a motion is feasible; `audit` is that of the closest motion.
+    """Return looser bounds of limits with which a motion is feasible; `audit` is the closest motion's.
 
     If the planner chooses the motion, or only its tensions matter, the motion that exceeds limits by least counts.
     """

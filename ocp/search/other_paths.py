@@ -71,7 +71,7 @@ def smaller_circle(scenario: Scenario) -> Change | None:
 def near_home(scenario: Scenario) -> Change | None:
     """Return the change of a path to one of the same form, shrunk towards the platform's home.
 
-    Its attitudes come nearer to that of home in proportion. It helps where neither end can be reached.
+    Its attitudes come nearer to the home attitude in proportion. It helps where neither end can be reached.
     """
     path, home = scenario.task.path, scenario.robot.home
     if not isinstance(path, LinePath | WaypointPath | CirclePath | FeedPath) or scenario.relative:

@@ -1,4 +1,4 @@
-"""Plan other tasks beside that of a search, with a part of the effort that is left for offers."""
+"""Plan other tasks than a search's own, with a part of the effort that is left for offers."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,7 +27,7 @@ LARGE, FEWEST = 600, 20  # free coordinates at all nodes of a mesh, and its step
 def planned(search: Search, scenario: Scenario, name: str, guess: Deviation | None = None) -> Plan | None:
     """Return a feasible plan of another scenario, whose audit is a stage with a `name`; None if none is found.
 
-    Without free coordinates it is the motion itself, else the solution of the program, refined as that of any task,
+    Without free coordinates it is the motion itself, else the solution of the program, refined as for any task,
     unless the scenario is proven infeasible.
     """
     if not scenario.count:

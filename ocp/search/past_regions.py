@@ -143,7 +143,7 @@ def _way_round(scenario: Scenario, start: np.ndarray, end: np.ndarray) -> np.nda
     tube, limits = scenario.task.tube, scenario.task.limits
     line = LinePath.model_validate({"kind": "line", "start": start.tolist(), "end": end.tolist()})
     given = {} if isinstance(scenario.task.path, LinePath) else {"initial": None, "final": None}
-    tube = tube.model_copy(update={"position": "free", "ends": None})  # those of a cycle are not the leg's
+    tube = tube.model_copy(update={"position": "free", "ends": None})  # the ends of a cycle are not the leg's
     leg = {"path": line, "duration": scenario.duration, "tube": tube} | given
     free = with_task(scenario, **leg)
     if limits.platform_box is None:
@@ -162,7 +162,7 @@ def _way_round(scenario: Scenario, start: np.ndarray, end: np.ndarray) -> np.nda
 
 
 def _clear_points(scenario: Scenario, points: np.ndarray) -> dict[int, np.ndarray]:
-    """Return, by those of points (k, 6) at which the robot cannot rest, a near position (3,) at which it can.
+    """Return a near position (3,) at which the robot can rest, for each of the points (k, 6) at which it cannot.
 
     If there is none, as where cables cross a wall through the robot, no path leads from there either.
     """
@@ -185,7 +185,7 @@ def _clear_points(scenario: Scenario, points: np.ndarray) -> dict[int, np.ndarra
 
 
 def _nearest(kept: AtRest, pose: np.ndarray, carriers: np.ndarray, beside: np.ndarray) -> np.ndarray | None:
-    """Return the position nearest to that of a pose, along an axis of {G}, at which the robot can rest, or None.
+    """Return the position nearest to a pose, along an axis of {G}, at which the robot can rest, or None.
 
     The nearest from which the lines to positions `beside` it (k, 3) are clear is preferred, unless the planner may
     leave the line by the shift.

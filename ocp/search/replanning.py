@@ -57,7 +57,7 @@ class Replanner:
         return Search(left, self._solvers, progress), guess
 
     def plan(self, search: Search, guess: Deviation | None, time: float) -> Plan:
-        """Return the plan of a search; the next rest is that of this plan if it is feasible."""
+        """Return the plan of a search; the next remainder is taken from this plan if it is feasible."""
         plan = self._by_last_solution(search, guess)
         if plan is None:
             anew = Search(search.scenario, {}, search.progress, search.seconds_left)
@@ -96,7 +96,7 @@ def _check(scenario: Scenario) -> None:
 
 
 def _open(ends: Word) -> Word:
-    """Return how a remainder ends: that of a cycle does not end where it starts."""
+    """Return how a remainder ends: a cycle's remainder does not end where it starts."""
     return "free" if ends == "periodic" else ends
 
 

@@ -45,7 +45,7 @@ class Chosen(NamedTuple):
 
 
 def shortest_durations(scenario: Scenario) -> tuple[Scenario, Chosen | None]:
-    """Return the scenario with numbers for the ranges of its phases, or for that of a path that dwells.
+    """Return the scenario with numbers for the ranges of its phases, or for the range of a path that dwells.
 
     Also return the stage that chose them; None for any other scenario, which is returned as it is.
 

@@ -37,7 +37,7 @@ def other_duration(search: Search, scenario: Scenario, left: Durations | None, a
     """Return the nearest duration at which a scenario's motion exactly on its path is possible, if one is known.
 
     Speeds fall with the duration, accelerations with its square; `left` are the durations that the tensions allow, and
-    `audit` is that of this motion.
+    `audit` is this motion's.
     """
     if not scenario.stretches or (left is not None and not left.exist):
         return []
@@ -119,7 +119,7 @@ def _lasting(search: Search, seconds: float) -> Plan | None:
 def longer_phases(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
     """Return the shortest feasible durations of the phases that exceed something, all longer by one factor.
 
-    `audit` says which phases these are. Other phases keep their durations; the motion is that of the paths.
+    `audit` says which phases these are. Other phases keep their durations; the motion follows the paths.
     """
     times = [excess.time for excess in audit.excess if excess.time is not None]
     times += audit.times[audit.violation > audit.tolerance].tolist()
@@ -128,7 +128,7 @@ def longer_phases(search: Search, scenario: Scenario, audit: Audit) -> list[Rela
 
 
 def longer(scenario: Scenario, times: np.ndarray | None = None) -> Change | None:
-    """Return the change of the duration, or those of the phases that move, to longer ones by one factor.
+    """Return the change of the duration, or of the durations of phases that move, to longer ones by one factor.
 
     With `times` only the phases in which one of them is become longer.
     """

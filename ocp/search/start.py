@@ -65,7 +65,7 @@ def _of_law(scenario: Scenario, law: FastestLaw) -> Deviation | None:
 def _along(scenario: Scenario, path: AnyPath, carriers: dict[int, AnyPath], seconds: float) -> Deviation | None:
     """Return the deviation of a platform on `path` and of carriers on theirs, or where the planner guesses them."""
     if path.frame != scenario.path.frame:
-        raise InputError(f"start.frame must be {scenario.path.frame!r}, as that of the task's path, got {path.frame!r}")
+        raise InputError(f"start.frame must be {scenario.path.frame!r}, as in the task's path, got {path.frame!r}")
     if scenario.count == 0:
         return None
     nodes = np.linspace(0.0, seconds, scenario.task.steps + 1)

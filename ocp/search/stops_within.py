@@ -1,6 +1,6 @@
 """Plan a motion so slow that the robot can stop on its path in time from every instant: `stopping_within`.
 
-The stops are those of `control.stop`. If the robot stops too late and the duration is a choice, longer ones are tried:
+`control.stop` computes the stops. If the robot stops too late and the duration is a choice, longer ones are tried:
 first longer by as much as the stop is too long, then between one that is too short and one that suffices.
 """
 
@@ -29,7 +29,7 @@ from ..tasks.status import MotionStatus
 from .other_plans import planned, rounded
 from .search import Search
 
-LEAST_PERIOD, INSTANTS = 0.02, 200  # [s], from the beginning of one stop to that of the next; and how many at most
+LEAST_PERIOD, INSTANTS = 0.02, 200  # [s], from one stop's beginning to the next one's; and how many at most
 ONE_OF = 8  # stops is computed first, where it is enough to know that one takes too long
 ROUNDS = 10
 LEAST_STEP, LARGEST_STEP = 1.02, 3.0  # times the duration
@@ -234,7 +234,7 @@ def _trajectory(plan: Plan, extreme: int | None = None) -> Trajectory:
     starts = scenario.phases.boundaries[:-1]
     numbers = scenario.phases.loads_at(starts, extreme) if scenario.phases.carry else []
     loads = [
-        # Unchecked: the inertia of an extreme load about its own CoM may be that of no body.
+        # Unchecked: the inertia of an extreme load about its own CoM may be impossible for a body.
         RigidLoad.model_construct(mass=row[0], com=tuple(row[1:4]), inertia=tuple(row[4:])) if row[0] else None
         for row in numbers
     ]

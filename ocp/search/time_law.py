@@ -1,7 +1,7 @@
 """Compute the fastest time law along a task's path, as a stage of planning: `fastest`.
 
 Where the path is followed exactly from rest to rest, `time_along` computes the least time of all time laws: a shorter
-duration is impossible, and its law is a plan if it keeps the task's other limits too. Its minimum is that of a grid:
+duration is impossible, and its law is a plan if it keeps the task's other limits too. Its minimum is found on a grid:
 it differs from the true one by the grid's interval, some tenths of a per cent, so that `BOUND` of it is proven.
 """
 

@@ -63,7 +63,7 @@ def for_robots(first: Plan, task: Task, share: float, climb: Climb) -> Plan:
             break
         again = climb(lay_out(_tightened(robot, tightened), task), plan.deviation)
         if not again.feasible and first.scenario.duration_range is not None:
-            # A fast motion's tensions spread more than those of the slower one that tightened limits take.
+            # A fast motion's tensions spread more than those of the slower motion to which tightened limits lead.
             tightened = (tightened + kept) / 2
             again = climb(lay_out(_tightened(robot, tightened), task), plan.deviation)
         tried.append(again)

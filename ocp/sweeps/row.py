@@ -15,7 +15,7 @@ from ..planner import plan
 from ..reports.report import decisive
 from ..tasks.task import Task
 
-FAILED = "failed"  # the status of a plan that ended with an error, beside those of `MotionStatus`
+FAILED = "failed"  # the status of a plan that ended with an error, besides those of `MotionStatus`
 
 
 class Row(NamedTuple):
@@ -54,7 +54,7 @@ def plan_case(number: int, robot: Robot, task: Task, file: Path | None) -> tuple
 
 
 def _row(planned: Plan) -> Row:
-    """Return the row of a plan; its cost, where no program was solved, is that of the audited tensions."""
+    """Return the row of a plan; its cost, where no program was solved, is computed from the audited tensions."""
     least, largest = (math.nan if value is None else value for value in (planned.margin, planned.tension_max))
     duration, iterations = planned.scenario.duration, planned.iterations
     reason, objective = ("", planned.objective) if planned.feasible else (decisive(planned), math.nan)

@@ -23,7 +23,7 @@ class FixedValue(NamedTuple):
     end: int  # 0 for the start, -1 for the end
     column: int  # the free coordinate
     order: int  # 0 for its value [m, rad], 1 and 2 for the time derivatives
-    value: float  # what it is, less that of the reference
+    value: float  # what it is, less the reference's value
 
 
 def platform_ends(task: Task) -> Word:

@@ -25,8 +25,8 @@ def lay_out(
 ) -> Scenario:
     """Check that `task` fits `robot` and lay it out.
 
-    `initial`: the state from which the motion starts, instead of the task's (`initial_of`). `limits`: those of a task
-    with the same `OF_LIMITS`, whose functions are built already.
+    `initial`: the state from which the motion starts, instead of the task's (`initial_of`). `limits`: limits of a
+    task with the same `OF_LIMITS`, whose functions are built already.
 
     Raises `InputError` naming the field of the task that does not fit, its value and the accepted values.
     """

@@ -51,7 +51,7 @@ def lay_out_phases(scenario: Scenario) -> Phases:
                     _supported(scenario, columns[index], needed, named)
                 continue
             if not np.array_equal(columns[index], columns[other]):
-                raise InputError(f"{named[0]}.ground.support must be that of {named[1]}, which is on the ground too")
+                raise InputError(f"{named[0]}.ground.support must be the same as in {named[1]}, also on the ground")
             own, its, *_ = (
                 _supported(scenario, columns[index], _at_rest(scenario, poses[index], load), named)
                 for load in (loads[index], loads[other], *([] if phase.load is None else phase.load.extremes))

@@ -180,7 +180,7 @@ def bodies(robot: Robot, task: Task) -> Iterator[tuple[AnyBody, str, frozenset[i
 
 
 def _of_bodies(robot: Robot, task: Task) -> Iterator[Limit]:
-    """Return the limits of all bodies, and those of floor and room of the platform's points if it has no body."""
+    """Return the limits of all bodies; without a platform body, floor and room limit the platform's points."""
     given = task.limits
     for body, whose, phases in bodies(robot, task):
         its = list[Limit](inside_room(skeleton(body).corners, body.rounding, whose, robot.floor, robot.workspace_box))

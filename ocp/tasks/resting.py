@@ -4,7 +4,7 @@ While platform and carriers rest, A and w are constant. Tensions that change lin
 at the end then balance with support forces that do the same: A t + S n = w holds for every mean of two solutions. So a
 phase on the ground is possible if its ends are, and a load is picked up and put down at a constant rate.
 
-Where a phase without ground comes before or after, its tensions there are those of the end. At the start and end of
+Where a phase without ground comes before or after, the end has its tensions. At the start and end of
 the task, and between two phases on the ground, the cables carry as little as they can.
 """
 

@@ -61,7 +61,7 @@ class Scenario(Displayed):
 
     robot: Robot
     task: Task
-    path: AnyPath  # that of the platform: the task's, or the same geometry with a time law that the planner chose
+    path: AnyPath  # of the platform: the task's, or the same geometry with a time law that the planner chose
     dynamics: Dynamics
     relative: bool  # whether the platform's path is given in the frame of the robot's only carrier
     platform_free: list[int]  # coordinates of the platform that may leave the path
@@ -69,7 +69,7 @@ class Scenario(Displayed):
     limits: Limits
     carrier_paths: dict[int, AnyPath] = field(repr=False)
     duration: float  # [s]; of a task that leaves it free: where the planner starts, then what it chose
-    phases: Phases = field(default_factory=Phases, repr=False)  # those of the task, if it has some
+    phases: Phases = field(default_factory=Phases, repr=False)  # of the task, if it has some
     passing: bool = False  # whether each leg of the path has its own duration (`search.passing_times`)
     tightened: np.ndarray | float = 0.0  # by how much the tension limits are, for the uncertain robots, (m,) [N]
 

@@ -63,7 +63,7 @@ class KeepOut(Part):
 
     @model_validator(mode="after")
     def _thick_enough(self) -> Self:
-        thickness = getattr(self, "thickness", np.inf)  # that of the shape, which each subclass adds
+        thickness = getattr(self, "thickness", np.inf)  # each subclass adds the thickness of its shape
         if thickness < THINNEST:
             raise ValueError(f"must be at least {THINNEST:g} m thick, got {thickness:.3g} m")
         return self

@@ -25,12 +25,12 @@ at least the square of the mean:
     sqrt(n_1^2 a'^2 + n_2^2 b'^2) >= n_1^2 a' + n_2^2 b' >= s + n_1 c_1 + n_2 c_2,
 
 the latter since n^2 >= n - (1 - n^2) / 2 for c > 0, and n^2 <= n for c < 0. In |X| and |Y| the ellipse is a triangle,
-whose two corners are cut off at a^2 and b^2. So the forces lie in the convex hull of those of two winds a quadrant:
+whose two corners are cut off at a^2 and b^2. So the forces lie in the hull of the forces of two winds a quadrant:
 V_1 = a with V_2^2 = b'^2 (1 - a^2 / a'^2), and the same with both axes exchanged; V_2 is zero for c_2 <= 0. Where b < 0
 the disc does not reach the quadrant; V_2 is b then. These eight winds are as fast as s along one axis. With lift, or
 with the form "printed", the ninth is the one nearest to the CoM's velocity along both axes. At rest the winds are in
-the disc, so that they decide exactly. While the platform moves some are faster than any of the disc: tensions that
-exist in them exist in the disc, but that they do not proves nothing. Winds of the disc itself, `WindDisc.possible`,
+the disc, so that they decide exactly. While the platform moves some are faster than any of the disc: if tensions
+exist in them, they exist in the disc, but if not, nothing is proven. Winds of the disc itself, `WindDisc.possible`,
 have to prove it.
 """
 
@@ -46,9 +46,9 @@ from ...models.part import Box, Part, Positive, Vector3
 from ...models.platform import Aero
 from ...models.rigid_body import com_velocity
 
-# Which value of a coordinate: the box's smallest, its largest, or that of the CoM's velocity.
+# Which value of a coordinate: the box's smallest, its largest, or the CoM's velocity.
 LOW, HIGH, ALONG = range(3)
-SMOOTHED = 1e-3  # [m/s]: a speed is the root of its square and that of this, which has derivatives at rest
+SMOOTHED = 1e-3  # [m/s]: a speed is the root of its square plus the square of this, which has derivatives at rest
 TINY = 1e-12  # [m/s]
 RING = 16  # winds on the edge of a disc
 

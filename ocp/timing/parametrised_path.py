@@ -4,9 +4,10 @@ The wrench of a motion s(t) along the path is
 
     w = a(s) d2s/dt2 + b(s) (ds/dt)^2 + c(s)
 
-since the dynamics are linear in accelerations and quadratic in velocities: c is the wrench of rest, a that of p'(s) as
-an acceleration, b that of p'(s) as a velocity and p''(s) as an acceleration. In {G} the carriers act on the platform
-only through the wrench matrix, so their motion along s enters A(s) and, if the path is given in a carrier's frame, p.
+since the dynamics are linear in accelerations and quadratic in velocities: c is the wrench at rest, a the wrench of
+an acceleration of p'(s), b the wrench of a velocity of p'(s) and an acceleration of p''(s). In {G} the carriers act on
+the platform only through the wrench matrix, so their motion along s enters A(s) and, if the path is given in a
+carrier's frame, p.
 """
 
 from collections.abc import Iterator

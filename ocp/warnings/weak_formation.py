@@ -16,7 +16,7 @@ def weak_formation(seen: Instants, formation: float | None = None) -> list[str]:
     """Return a sentence if the wrench matrix comes close to losing rank, in comparison with home.
 
     Moments are divided by the robot's length. Singular values that are near zero at home do not count, unless they are
-    so in the motion, too. `formation` is that of the objective [m]; default: the mean length of the cables.
+    so in the motion, too. `formation` is the objective's [m]; default: the mean length of the cables.
     """
     robot = seen.robot
     rows = np.flatnonzero(robot.dof_mask)

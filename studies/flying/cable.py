@@ -56,7 +56,7 @@ def _stiffness(robot: Robot) -> list[Claim]:
     held = cable.node_forces(np.zeros((cable.elements + 1, 3)), WINDING)[-1] @ cable.direction
     # The direction of x_c in {G} by the row u^T of Eq. 17 beside the direction of the cable.
     vector = robot.anchors[0] - robot.home_attachments[0]  # L by Eq. 4
-    # K_n of two elements, from the blocks k_1 to k_4 of Eq. 19, beside that of the chain.
+    # K_n of two elements, from the blocks k_1 to k_4 of Eq. 19, besides the K_n of the chain.
     block = double.stiffness * double.elements / double.length * np.outer(double.direction, double.direction)
     printed = np.zeros((9, 9))
     for start in (0, 3):

@@ -1,6 +1,6 @@
 """Paper F's three motions, flown: the library's robot with its elastic cables, in the wind of figure 5.
 
-The plans are those of `plans`, which know no air. Each is flown three times: by the lengths of Eq. 5 without control
+The plans are made by `plans`, without air. Each is flown three times: by the lengths of Eq. 5 without control
 (`wound`), by computed torque under a quadrotor that stays on its plan, and by computed torque under one that gives way
 to the wind by up to 0.5 m. The last two also fly the circle of radius 0.15 m under a hovering quadrotor. Where there is
 no wind the air rests, so a platform that flies straight at 10 m/s has drag without any.
@@ -165,7 +165,7 @@ def _wind(robot: Robot, part: Flown) -> Claim:
 
 
 def _own_drag(robot: Robot, part: Flown) -> Claim:
-    """Compare the drag in still air with that of Eq. 25, where V_w is the wind over the ground."""
+    """Compare the drag in still air with the drag of Eq. 25, where V_w is the wind over the ground."""
     dynamics = Dynamics(robot)
     drag = dynamics.aerodynamic_wrench(part.body.pose, part.body.velocity, np.zeros(3))[:, :2]
     strongest = dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), np.array(PEAK))[:2]

@@ -19,7 +19,7 @@ def circle(radius: float, times: np.ndarray = TIMES, below: float = BELOW) -> Mo
 def steady_tensions(dynamics: Dynamics, motion: Motion, base: Motion | None = None) -> np.ndarray:
     """Return T = A^-1 w of a robot with six cables and one carrier, (n, 6) [N]: negative where a cable would push.
 
-    The platform's motion is in {A}, that of the carrier, `base`, in {G}; default: hovering, level.
+    The platform's motion is in {A}, the carrier's, `base`, in {G}; default: hovering, level.
     """
     w = dynamics.relative.required_wrench(*motion, *(base or ()))
     return solved(dynamics.relative.wrench_matrix(motion.pose), w)

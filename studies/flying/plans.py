@@ -28,10 +28,7 @@ LINE = LinePath(kind="line", start=(*START, 0, 0, 0), end=(*END, 0, 0, 0), timin
 RATE = 0.2 * np.pi  # [rad/s]
 BELOW = 1.0  # of the circle's centre under the quadrotor [m]
 PITCH = 0.1  # [rad], assumed
-NOT_READ = (
-    "The recognised text has the captions of figures 12 to 15 but not their section, so what the paper prints there is "
-    "not known here."
-)
+NOT_READ = "The recognised text lacks the section of figures 12 to 15."
 GRAVITY = 9.81
 Name = Literal["circle", "helix", "pitching"]
 

@@ -5,8 +5,8 @@ and once shaken by a small force along each axis, at 5, 6 and 7 Hz as in `vibrat
 the vibration that the procedure receives; what it adds to the tensions is what the procedure should give.
 
 Its dT has two parts. Both take the displacement of the platform from its steady motion, and the damping divides it by
-the time step, which is no part of the vibration. If the displacement is instead that of one time step, the damping is
-right and the elasticity is not.
+the time step, which is no part of the vibration. If the displacement is instead the change in one time step, the
+damping is right and the elasticity is not.
 """
 
 from typing import NamedTuple
@@ -32,7 +32,7 @@ FORCE = 0.1  # amplitude along each axis [N]: it takes no tension below zero
 SHAKEN = FLIGHT[:3001]  # instants of the vibration [s]
 BEGUN = slice(1000, -200)  # its rows without its begin and its end
 STEPS = (1, 10, 100)  # time steps of the procedure, in periods
-USED = STEPS[1]  # that of `vibration`
+USED = STEPS[1]  # the time step of `vibration`
 SHOWN = slice(2000, 2801)  # the rows of the figure
 SAME = 0.01  # of what is compared
 RELEASED = np.diag([1e-4] * 6)  # velocities of the platform in the beginning [m/s, rad/s], one coordinate in each row
@@ -120,7 +120,7 @@ def release(robot: Robot) -> np.ndarray:
 
 
 def blow(robot: Robot) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Return the largest dT / T of each cable by the wind's noise, (m,), and that of cable 1 over time in [%].
+    """Return the largest dT / T of each cable by the wind's noise, (m,), and the ratio of cable 1 over time in [%].
 
     Both by the time between two samples of the noise.
     """

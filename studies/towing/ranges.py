@@ -74,7 +74,7 @@ def _ranges(drive: Drive, samples: Loops) -> list[Claim]:
     for axis, printed, computed, least in zip("xyz", PRINTED[drive], samples.ranges, narrow, strict=True):
         own = drive == "both" and axis != "z"
         differs = not own and bool(least[0] < printed[0] - DIGIT or least[1] > printed[1] + DIGIT)
-        not_printed = "The widths of the boxes are not printed, and those of this run are inferred from "
+        not_printed = "The widths of the boxes are not printed but inferred from "
         if own:
             why = f"{not_printed}this very range."
         elif differs:
@@ -146,7 +146,7 @@ def _sections(fixed: Loops) -> list[Claim]:
     cuts = [fixed.points[np.abs(fixed.points[:, 2] - height) <= THICKNESS / 2][:, :2] for height in SECTIONS]
     shares = [share_of_rectangle(points) for points in cuts]
     areas = [ConvexHull(points).volume for points in cuts]
-    not_printed, unknown = "The widths of the boxes are not printed. With those of this run", Verdict.NOT_DETERMINED
+    not_printed, unknown = "With the inferred widths of the boxes", Verdict.NOT_DETERMINED
     fields = {"heights": ", ".join(map(str, SECTIONS)), "not_printed": not_printed}
     claims = []
     ideals = {"triangle": TRIANGLE, "rectangle": RECTANGLE}

@@ -36,7 +36,7 @@ def chapter() -> Chapter:
         ),
         claim("eq-17-lambda").stated((low, high), low <= 0 and high >= 1, at=", ".join(f"{T:.1f}" for T in at)),
         _scalar_elsewhere(),
-        # Directions along which one scalar moves the tensions, and those of all solutions.
+        # Dimension of the solutions with one scalar, and of all solutions.
         claim("eq-17-general").compared([free for m, free in of_forces.items() if m > 3], printed=1.0),
         _cases(),
         _rank_test(),

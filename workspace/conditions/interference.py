@@ -75,7 +75,7 @@ def segment_distance(p: np.ndarray, p_end: np.ndarray, q: np.ndarray, q_end: np.
 def nearest_points(
     p: np.ndarray, p_end: np.ndarray, q: np.ndarray, q_end: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the vector from the nearest point of segment q to that of p, (..., 3) [m], and their shares of p and q."""
+    """Return the shortest vector from segment q to segment p, (..., 3) [m], and its ends as fractions of p and q."""
     along, across, between = p_end - p, q_end - q, p - q
     a, e, f = _dot(along, along), _dot(across, across), _dot(across, between)
     b, c = _dot(along, across), _dot(along, between)
@@ -137,7 +137,7 @@ def _from_box(low: np.ndarray, high: np.ndarray, p: np.ndarray, p_end: np.ndarra
 
 
 def _from_mesh(body: Polyhedron, p: np.ndarray, p_end: np.ndarray) -> np.ndarray:
-    """Return the distance of segments from a convex body, zero inside: that of its edges, or of an end from a face."""
+    """Return the distance of segments from a convex body, zero inside: from its edges, or of an end from a face."""
     nearest = np.full(len(p), np.inf)
     for start, end in body.edges:
         corner, other = (np.broadcast_to(point, p.shape) for point in (start, end))

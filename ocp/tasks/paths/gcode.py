@@ -131,7 +131,7 @@ class _Reader:
             self.ignored.add(f"G{code:g}")
 
     def _lengths(self, words: dict[str, float], letters: str) -> dict[str, float]:
-        """Return those of the words that are lengths, in metres."""
+        """Return the words that are lengths, in metres."""
         if self._unit is None:
             raise ValueError("the unit must be given before, by G20 (inches) or G21 (millimetres)")
         return {letter: value * self._unit for letter, value in words.items() if letter in letters}
@@ -200,7 +200,7 @@ class _Reader:
         self.dwell.append(0.0)
 
     def _words(self, line: str) -> tuple[list[float], dict[str, float]]:
-        """Return the G codes of a line, and the values of its other words but those of M codes."""
+        """Return the G codes of a line, and the values of its other words except M codes."""
         codes: list[float] = []
         words: dict[str, float] = {}
         at = 0

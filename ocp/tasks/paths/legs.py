@@ -203,7 +203,7 @@ def _through(
     before: tuple[np.ndarray, np.ndarray],
     after: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, ...]:
-    """Return what two legs have done where both move, with two derivatives by s; `offset` is s less that of the point.
+    """Return what two legs have done where both move, with two derivatives by s; `offset` is s less the point's s.
 
     `before` and `after` are the weight of a leg in s and how long it lasts.
     """

@@ -25,7 +25,7 @@ PARTS = 12  # of that, which are compared
 LOOKS = 16  # at the acceleration of two legs together
 TOGETHER = 1.1  # of the larger peak of one leg alone: the acceleration of two together
 BACK = 1e-3  # of the sum of the unit vectors of two legs: the path turns back, and rests there
-STEPS, AT_BOUNDS = 30, 12  # of `meeting`: it mostly needs 6; those of them that may end at a bound
+STEPS, AT_BOUNDS = 30, 12  # of `meeting`, which mostly needs 6; how many may end at a bound
 ROUNDED = 1e-12  # of an overlap
 ROUNDS = 8  # of `even_out`: more change the times by less than a hundredth
 

@@ -34,7 +34,7 @@ class ReturnPath(PathBase):
     @model_validator(mode="after")
     def _fits(self) -> Self:
         if self.frame != self.path.frame:
-            raise ValueError(f"frame must be that of path, {self.path.frame!r}, got {self.frame!r}")
+            raise ValueError(f"frame must equal path.frame, {self.path.frame!r}, got {self.frame!r}")
         if not self.start < self.duration:
             raise ValueError(f"start must be less than duration, {self.duration:g} s, got {self.start:g} s")
         if self.settle > (self.duration - self.start) * (1 + 1e-9):

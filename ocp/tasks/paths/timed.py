@@ -65,7 +65,7 @@ class TimedPath(PathBase):
                 if seconds > 0 and speed > 0:
                     raise ValueError(f"dwell[{index}] must be 0 s where the speed is not 0, got {seconds:g} s")
         if self.frame != self.along.frame:
-            raise ValueError(f"frame must be that of along, {self.along.frame!r}, got {self.frame!r}")
+            raise ValueError(f"frame must equal along.frame, {self.along.frame!r}, got {self.frame!r}")
         return self
 
     @cached_property

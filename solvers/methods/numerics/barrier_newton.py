@@ -110,7 +110,7 @@ def _primal_dual(form: StandardForm, square: float, mu: float, s: Array, warm: b
     """Return a point inside the limits and on Q s = b near the minimiser, or None if it does not come near."""
     below, above = s - form.lower, form.upper - s
     limits = int(np.isfinite(below).sum() + np.isfinite(above).sum())
-    # Cold, distances and multipliers are taken as those of a much larger mu, from which it falls step by step.
+    # A cold start takes the distances and multipliers of a much larger mu, which then falls step by step.
     product = mu if warm or not limits else max(mu, square * float(np.abs(s).max()) ** 2, 1e-2)
     iterate = _Iterate(s, product / below, product / above)
     for iteration in range(_STEPS):

@@ -15,7 +15,7 @@ _EXIT = {-1: "infeasible", -2: "cycling", -3: "unbounded", -4: "iteration limit"
 
 
 def least_norm(form: StandardForm, b: Array | None = None, slack: float = 0.0) -> Proposal:
-    """Minimise |s|^2 with Q s = b and limits moved outwards by `slack`; b, (r,), is that of the form if not given."""
+    """Minimise |s|^2 with Q s = b and limits moved outwards by `slack`; b, (r,), is by default the form's."""
     b = form.b if b is None else b
     return bounded_least_norm(np.append(form.upper + slack, b), np.append(form.lower - slack, b), form.Q, b.size)
 
@@ -31,7 +31,7 @@ def least_norm_in_null_space(form: StandardForm) -> Proposal:
 def bounded_least_norm(upper: Array, lower: Array, rows: Array, equalities: int) -> Proposal:
     """Minimise |x|^2 subject to lower <= (x, rows x) <= upper; the last `equalities` rows are equations.
 
-    - `upper`, `lower`: limits of x, as far as they go beyond the rows, followed by those of the rows.
+    - `upper`, `lower`: limits of x, as far as they go beyond the rows, followed by the limits of the rows.
     - `rows`: shape (rows, x).
     - `equalities`: how many of the last rows have equal limits.
     """
