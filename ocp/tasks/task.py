@@ -107,7 +107,7 @@ class FreeBase(Part):
     ends: Literal["free", "rest", "periodic", "exact"] | None = optional(
         "state at the start and the end. free: any state; rest: zero velocity, and zero linear acceleration (free "
         "if the robot has fewer cables than degrees of freedom, or cables of fixed length); periodic: the end state "
-        "equals the start state; exact: the states of `around`; default: as `tube.ends` if that is rest or "
+        "equals the start state; exact: the states of the paths `around`; default: as `tube.ends` if that is rest or "
         "periodic, otherwise free"
     )
 
@@ -131,8 +131,8 @@ class Objective(Part):
     carrier_acceleration: Positive = optional("acceleration of carriers [m/s^2, rad/s^2]", 1.0)
     carrier_offset: Positive = optional("distance of carriers from `around` or home [m, rad]", 10.0)
     formation: Positive | None = optional(
-        "distance of carriers from their places at home, which move and yaw with the platform [m]; default: the mean "
-        "length of the cables if several carriers are free without `around`, otherwise no cost"
+        "distance of carriers from their formation at home, which moves and yaws with the platform [m]; default: the "
+        "mean length of the cables if several carriers are free without `around`, otherwise no cost"
     )
     jerk: Positive = optional("jerk of every free coordinate [m/s^3, rad/s^3]; keeps motions smooth", 10.0)
     tension_rate: Positive | None = optional("rate of each tension [N/s]; default: no cost")
