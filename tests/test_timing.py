@@ -57,7 +57,7 @@ def straight(robot, by):
     return LinePath(kind="line", start=tuple(robot.home), end=tuple(robot.home + np.array(by)))
 
 
-def optimal_duration(robot, path, intervals, margin=0.0):
+def optimal_duration(robot, path, intervals, margin=0.0, power=np.inf):
     """Minimum time by IPOPT: ds/dt at the grid points and tensions at the midpoints are free, A t = w holds there."""
     dynamics, h = Dynamics(robot), 1.0 / intervals
     pose, first, second = path.by_fraction((np.arange(intervals) + 0.5) * h)
@@ -83,8 +83,10 @@ def optimal_duration(robot, path, intervals, margin=0.0):
         x.T, robot.m, 1
     )
     motors = np.array([cable.winch.tension_max if cable.winch else 1e6 for cable in robot.cables])
-    rows = ca.veccat(gap, (tensions - paid_out) / robot.force_scale)
+    powers = tensions * ca.DM(slope.T) * ca.repmat(ca.sqrt(x).T, robot.m, 1)
+    rows = ca.veccat(gap, (tensions - paid_out) / robot.force_scale, powers / min(power, 1e6))
     most = np.append(np.zeros(gap.numel()), np.tile(motors / robot.force_scale, intervals))
+    most = np.append(most, np.ones(powers.numel()))
     duration = ca.sum1(2 * h / (speed[1:] + speed[:-1]))
     program = {"x": ca.veccat(speed, tensions), "f": duration, "g": rows}
     solver = ca.nlpsol("time", "ipopt", program, {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes"})
@@ -151,7 +153,8 @@ def test_minimum_time_on_a_line_agrees_with_an_optimal_control_program():
     assert timing.duration == pytest.approx(best, rel=0.01)
 
 
-def test_motors_of_winches_give_the_minimum_time_of_an_optimal_control_program():
+@pytest.mark.parametrize("power", [None, 500.0])
+def test_motors_of_winches_give_the_minimum_time_of_an_optimal_control_program(power):
     """Their inertia is the mass of the platform; every second motor can do more than its cable."""
     data = load("ipanema-1").model_dump()
     mass = data["platform"]["mass"]
@@ -161,11 +164,33 @@ def test_motors_of_winches_give_the_minimum_time_of_an_optimal_control_program()
     ]
     robot = Robot.model_validate(data)
     path = straight(robot, [0.6, 0.4, 0.3, 0, 0, 0])
-    fastest = time_along(robot, along(path))
+    fastest = time_along(robot, along(path, limits={"winch_power": power}))
     assert fastest.feasible
-    best = optimal_duration(robot, path.model_copy(update={"timing": "uniform"}), 200)
+    best = optimal_duration(robot, path.model_copy(update={"timing": "uniform"}), 200, power=power or np.inf)
     assert fastest.duration == pytest.approx(best, rel=0.005)
-    assert any("winch_force" in each.limit for each in fastest.law.bottlenecks)
+    for name in ("winch_force", "winch_power") if power else ("winch_force",):
+        assert any(name in each.limit for each in fastest.law.bottlenecks)
+
+
+@pytest.mark.parametrize("power", [40.0, 80.0])
+def test_a_limit_of_power_gives_the_minimum_time_of_one_vertical_cable(power):
+    """Up with t_max, from v = P / t_max on with P / v, then down with t_min: dv/dt and dz/dv by quadrature."""
+    mass, height, t_min, t_max = 2.0, 1.5, 1.0, 40.0
+    robot = point_mass([[0, 0, 4]], ["z"], mass=mass, t_min=t_min, t_max=t_max)
+    task = along(straight(robot, [0, 0, height, 0, 0, 0]), limits={"winch_power": power})
+    fastest = time_along(robot, task, grid=800)
+    assert fastest.feasible
+    v = (np.arange(400_000) + 0.5) / 400_000 * power / (mass * GRAVITY)  # there the mass rises at a constant speed
+    step, up = v[1] - v[0], np.minimum(t_max, power / v) / mass - GRAVITY
+    down = GRAVITY - t_min / mass
+    risen, seconds = np.cumsum(v / up) * step, np.cumsum(1 / up) * step
+    turn = np.searchsorted(risen + v**2 / (2 * down), height)
+    assert fastest.duration == pytest.approx(seconds[turn] + v[turn] / down, rel=1e-3)
+    assert {each.limit for each in fastest.law.bottlenecks} == {
+        "t_max of cable 1",
+        "winch_power of cable 1",
+        "t_min of cable 1",
+    }
 
 
 @pytest.mark.parametrize(("inertia", "force"), [(3.0, 40.0), (300.0, 40.0), (2e4, 40.0), (3.0, 1.0)])

@@ -16,7 +16,7 @@ from ..tasks.scenario import Scenario
 from ..tasks.task import Tube
 from ..tasks.task_limits import TaskLimits
 from ..timing.time_along import time_along
-from ..timing.timed_task import KNOWN_LIMITS
+from ..timing.timed_task import WITHOUT_POWER
 
 BOUND = 0.99  # of the fastest law's time on its grid: no law is faster than this
 
@@ -41,7 +41,8 @@ class PathTiming:
 def fastest(scenario: Scenario) -> tuple[Plan | None, str]:
     """Return the fastest law along the path of a scenario whose duration alone is free, or None, and the message.
 
-    `stop_within` and limits that `time_along` does not know are left out: its time is a lower bound even so.
+    `stop_within`, powers of winches, whose law is a local optimum, and limits that `time_along` does not know are left
+    out: its time is a lower bound even so.
     """
     task = scenario.task
     if not all(isinstance(path, RestPath) for path in scenario.carrier_paths.values()):
@@ -52,7 +53,7 @@ def fastest(scenario: Scenario) -> tuple[Plan | None, str]:
     own = path.natural_duration is not None or getattr(path, "timing", "") == "uniform"
     if own or not isinstance(path, LinePath | WaypointPath):
         return None, f"not computed: the path of kind {task.path.kind} has a time law of its own"
-    hard = {name: getattr(task.limits, name) for name in KNOWN_LIMITS if name not in task.limits.soft}
+    hard = {name: getattr(task.limits, name) for name in WITHOUT_POWER if name not in task.limits.soft}
     alone = {"limits": TaskLimits(**hard), "margin": scenario.hard_margin, "tube": Tube(), "stop_within": None}
     try:
         found = time_along(scenario.robot, task.model_copy(update=alone))

@@ -22,6 +22,7 @@ from .parametrised_path import ParametrisedPath, PathLimits, relative
 LOOKS = 120  # intervals of equal duration, divided where the motion dwells
 REACHED = 0.995  # of a limit of speed or acceleration
 PULLS = 1e-6  # of the largest pull along a facet's normal: less lies in the facet
+LARGEST = "t_max", "winch_force", "winch_power"  # what limits largest tensions
 SHOWN = 10.0  # [s], of a path without a time law: how long the motion lasts that shows it
 
 
@@ -53,7 +54,7 @@ def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: floa
     curves = parametrised.at(s)
     platform, carriers = (motion.timed(sd, sdd) for motion in curves)
     names, shares = [], []
-    for each in limits:
+    for each in (limits.speeds, limits.accelerations):
         names += [
             f"{limit.name.partition('_')[2].replace('_', ' ')} of {label}" for limit in each for label in limit.labels
         ]
@@ -66,7 +67,8 @@ def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: floa
     if np.isfinite(force).any():
         P, Q = parametrised.reflected(*curves)
         force = force + P * sdd[:, None] + Q * np.square(sd)[:, None]
-    force = np.broadcast_to(force, (s.size, len(high)))
+    power = parametrised.pull_per_speed(*curves, limits.power) / np.maximum(sd, np.finfo(float).tiny)[:, None]
+    largest = np.stack(np.broadcast_arrays(high, force, power))  # (3, n, m)
     reached_limits = []
     for k in range(s.size):
         if sd[k] == sdd[k] == 0:
@@ -74,8 +76,8 @@ def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: floa
         elif reached[k].max(initial=0.0) >= REACHED:
             reached_limits.append(names[int(reached[k].argmax())])
         else:
-            problem = wrench_problem(parametrised.robot, A[k], w[k], low, np.clip(force[k], low, high))
-            reached_limits.append(_tensions(problem, force[k] < high))
+            problem = wrench_problem(parametrised.robot, A[k], w[k], low, np.clip(largest[:, k].min(axis=0), low, high))
+            reached_limits.append(_tensions(problem, largest[:, k].argmin(axis=0)))
     at, stretches, first = path.law(edges)[0], [], 0
     for limit, run in groupby(reached_limits):
         after = first + len(list(run))
@@ -84,17 +86,17 @@ def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: floa
     return stretches
 
 
-def _tensions(problem: TensionProblem, motors: np.ndarray) -> str:
+def _tensions(problem: TensionProblem, limits: np.ndarray) -> str:
     """Return which cables are at which limit on the facet nearest to the needed wrench.
 
-    `motors`, (m,) of bool, says whose largest tension is what accelerating its winch leaves of the motor's force.
+    `limits`, (m,), are the indices among `LARGEST` of what limits each cable's largest tension.
     """
     pull = capacity_margin(problem).direction @ problem.A
     size = np.abs(pull).max(initial=0.0)
     high = pull > PULLS * size
-    at = {"t_min": pull < -PULLS * size, "t_max": high & ~motors, "winch_force": high & motors}
-    limits = [f"{name} of {numbered('cable', np.flatnonzero(cables))}" for name, cables in at.items() if cables.any()]
-    return "; ".join(limits) or "tensions"
+    at = {"t_min": pull < -PULLS * size} | {name: high & (limits == k) for k, name in enumerate(LARGEST)}
+    names = [f"{name} of {numbered('cable', np.flatnonzero(cables))}" for name, cables in at.items() if cables.any()]
+    return "; ".join(names) or "tensions"
 
 
 @dataclass(frozen=True, eq=False)

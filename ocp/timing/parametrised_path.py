@@ -21,7 +21,7 @@ from ...models import Robot
 from ...models.dynamics import dynamics_of
 from ...models.part import COORDINATES
 from ..audits.checks import LENGTH_TOLERANCE
-from ..limits.cables import CableAcceleration
+from ..limits.cables import CableAcceleration, CableSpeed
 from ..limits.limit import Magnitude
 from ..limits.limits import Limits
 from ..limits.platform import ZoneSpeed
@@ -42,10 +42,11 @@ FINE = 10  # times as many points at which the bound of a zone is computed
 
 
 class PathLimits(NamedTuple):
-    """The limits besides those of the tensions, all of whose values are proportional to speeds or to accelerations."""
+    """The limits besides those of the tensions: of values proportional to speeds or to accelerations, and of powers."""
 
     speeds: Limits
     accelerations: Limits
+    power: float = np.inf  # of each winch [W]
 
 
 class Wrench(NamedTuple):
@@ -213,6 +214,13 @@ class ParametrisedPath:
         P, Q, _ = next(_parts(every, platform, carriers))
         inertia = np.array([cable.winch.inertia if cable.winch else 0.0 for cable in self.robot.cables])
         return P * inertia, Q * inertia
+
+    def pull_per_speed(self, platform: Motion, carriers: Motion, power: float) -> np.ndarray:
+        """Return the largest tension of each cable, times ds/dt, that a power [W] of its winch allows, (n, m) [N/s]."""
+        if power == np.inf:
+            return np.full((len(platform.pose), self.robot.m), np.inf)
+        (rates,) = Limits(self.robot, (CableSpeed(self.robot, 1.0),)).along(platform, carriers)
+        return power / np.maximum(np.abs(rates), np.finfo(float).tiny)
 
     def _frame(self) -> bool:
         only = self.robot.carriers[0].name if len(self.robot.carriers) == 1 else None

@@ -20,6 +20,15 @@ from .parametrised_path import ParametrisedPath, PathLimits, Wrench
 FLAT = 1e-9  # relative: a wrench that lies so near to the span of the cables lies in it
 
 
+Rows = tuple[np.ndarray, np.ndarray, np.ndarray]  # a, b and c of half-planes a u + b x + c <= 0, (N, K) each
+
+
+def joined(rows: Rows, others: Rows, chosen: np.ndarray | slice = slice(None)) -> Rows:
+    """Return half-planes and those chosen of others, of the same points."""
+    a, b, c = (np.hstack([part, its[:, chosen]]) for part, its in zip(rows, others, strict=True))
+    return a, b, c
+
+
 @dataclass(frozen=True)
 class PhasePlane(Displayed):
     """The limits of a motion along a path, at N points of it.
@@ -33,9 +42,9 @@ class PhasePlane(Displayed):
     x_max: np.ndarray  # the largest x that the limits of speed allow, (N,) [1/s^2]
     # limits of accelerations, also of the winches that a motor can just accelerate, a u + b x + c <= 0 with (N, k) each
     acceleration_rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]]
-    winches: "Winches | None"  # None if none has a motor of its own
+    winches: "Winches | None"  # None if none has a motor of its own or a limit of its power
 
-    def rows(self, weight: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def rows(self, weight: float) -> Rows:
         """Return all limits but x_max as a u + b x + c <= 0, (N, K) each, without units.
 
         Rows of tensions are in parts of the weight, the others in parts of their limits. The last row is 1 <= 0 where
@@ -53,25 +62,30 @@ class PhasePlane(Displayed):
         """Return whether the platform can rest at the first and the last point."""
         return bool((self.rows(weight)[2][[0, -1]] <= 0).all())
 
-    def tension_rows(self, weight: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def tension_rows(self, weight: float) -> Rows:
         """Return the facets' half-planes alone: first those of `available.high`, then those of `available.low`."""
         normals, low, high = self.available.normals, self.available.low, self.available.high
         a, b, c = ((normals @ part[:, :, None])[..., 0] / weight for part in self.wrench)
         return np.hstack([a, -a]), np.hstack([b, -b]), np.hstack([c - high / weight, low / weight - c])
 
-    def winch_rows(self, short: "Short", weight: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def winch_rows(self, winches: "Winches", short: "Short", weight: float) -> Rows:
         """Return the half-planes of `tension_rows` where motors that are too `short` for a limit replace it."""
-        if self.winches is None:
-            raise TypeError("no cable has a winch with a motor")
-        pulls, (P, Q) = self.winches.pulls, self.winches.reflected
+        pulls, (P, Q) = winches.pulls, winches.reflected
         pulls = np.concatenate([pulls, -pulls], axis=1)
         hauled, eased = np.maximum(pulls, 0.0), np.maximum(-pulls, 0.0)
         moved = hauled * short.at_max[:, None] - eased * short.at_min[:, None]
-        gap = np.einsum("nkm,nm->nk", hauled, np.where(short.at_max, self.winches.force - self.winches.high, 0.0))
-        gap += np.einsum("nkm,nm->nk", eased, np.where(short.at_min, self.winches.force + self.winches.low, 0.0))
+        gap = np.einsum("nkm,nm->nk", hauled, np.where(short.at_max, winches.force - winches.high, 0.0))
+        gap += np.einsum("nkm,nm->nk", eased, np.where(short.at_min, winches.force + winches.low, 0.0))
         a, b, c = self.tension_rows(weight)
         a, b = (part - np.einsum("nkm,nm->nk", moved, its) / weight for part, its in ((a, P), (b, Q)))
         return a, b, c - gap / weight
+
+    def power_rows(self, winches: "Winches", u: np.ndarray, x: np.ndarray, weight: float) -> Rows:
+        """Return half-planes of powers and motors: of those too weak for a limit at u and x, then of all powers."""
+        winches, limited = winches.with_powers(u, x)
+        short = winches.short(u, x)
+        every = short._replace(at_max=short.at_max | limited)
+        return joined(self.winch_rows(winches, short, weight), self.winch_rows(winches, every, weight))
 
 
 class Short(NamedTuple):
@@ -87,7 +101,8 @@ class Winches(Displayed):
 
     pulls: np.ndarray  # of all cables along the normals of the facets, (N, K, m)
     reflected: tuple[np.ndarray, np.ndarray]  # P and Q, (N, m) each [N]
-    force: np.ndarray  # the largest of each motor less friction, (m,) [N]; infinite without a motor
+    force: np.ndarray  # the largest of each motor less friction, (N, m) [N]; infinite without a motor
+    powers: np.ndarray  # the largest tensions, times ds/dt, that the limit of power allows, (N, m) [N/s]
     low: np.ndarray  # tension limits, (m,) [N]
     high: np.ndarray  # likewise
 
@@ -96,6 +111,19 @@ class Winches(Displayed):
         P, Q = self.reflected
         moved = P * u[:, None] + Q * x[:, None]
         return Short(self.force + moved < self.high, moved - self.force > self.low)
+
+    def with_powers(self, u: np.ndarray, x: np.ndarray) -> tuple["Winches", np.ndarray]:
+        """Return winches whose motors keep the limit of power where they are strong enough at u and x, (N, m) of bool.
+
+        The tension that a power allows, in proportion to 1 / sqrt(x), is convex in x: its tangent is nowhere above it.
+        The tangent is that at x or, where the cable's own limit is tighter, at the x from which the power is.
+        """
+        P, Q = self.reflected
+        at = np.maximum(x[:, None], np.square(self.powers / self.high))
+        pull = self.powers / np.sqrt(at)
+        limited = pull < self.force + P * u[:, None] + Q * x[:, None]
+        reflected = np.where(limited, 0.0, P), np.where(limited, -pull / (2 * at), Q)
+        return replace(self, reflected=reflected, force=np.where(limited, 1.5 * pull, self.force)), limited
 
 
 @dataclass(frozen=True)
@@ -132,17 +160,21 @@ def phase_plane(
     available = facets(A, low, high)
     _check_span(s, wrench, available)
     force, winches = parametrised.motor_force, None
+    powers = parametrised.pull_per_speed(platform, carriers, limits.power * (1 - shrink))
     accelerations = parametrised.acceleration_rows(platform, carriers, limits, shrink)
-    if (own := np.isfinite(force)).any():
-        winches = Winches(available.normals @ A, parametrised.reflected(platform, carriers), force, low, high)
+    if (own := np.isfinite(force)).any() or np.isfinite(limits.power):
+        each = np.broadcast_to(force, powers.shape)
+        winches = Winches(available.normals @ A, parametrised.reflected(platform, carriers), each, powers, low, high)
         P, Q = (part[:, own] / force[own] for part in winches.reflected)
         c = np.append(low[own] / force[own] - 1, -high[own] / force[own] - 1)
         accelerations.append((np.hstack([-P, P]), np.hstack([-Q, Q]), np.broadcast_to(c, (len(s), len(c)))))
+    with np.errstate(divide="ignore"):
+        at_least = (powers / low).min(axis=1)  # the largest ds/dt, with tensions at their lower limits
     # The reserve must not turn the only wrench into none.
     low, high, inside = available.low, available.high, np.reshape(reserve, (-1, 1))
     middle = (low + high) / 2
     available = replace(available, low=np.minimum(low + inside, middle), high=np.maximum(high - inside, middle))
-    x_max = (parametrised.speed_limit(platform, carriers, limits) * (1 - shrink)) ** 2
+    x_max = np.minimum(parametrised.speed_limit(platform, carriers, limits) * (1 - shrink), at_least) ** 2
     return PhasePlane(wrench, available, x_max, accelerations, winches)
 
 

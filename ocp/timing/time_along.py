@@ -2,8 +2,8 @@
 
 Along a path only s(t) is left to choose. The available wrench set at each s (`solvers.available_wrench`) and the wrench
 that the motion needs (`parametrised_path`) make half-planes in d2s/dt2 and (ds/dt)^2 (`phase_plane`), and toppra finds
-the fastest law inside all of them (`toppra_law`). It is audited as any plan is; violations between the grid points are
-removed by a finer grid and by a little distance from the limits.
+the fastest law inside all of them (`piece`, `toppra_law`). It is audited as any plan is; violations between the grid
+points are removed by a finer grid and by a little distance from the limits.
 """
 
 import os
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...base.errors import InputError, SolverError
+from ...base.errors import InputError
 from ...base.inputs import whole_number
 from ...models import Robot
 from ...models.files import AnyRobot, as_robot
@@ -44,7 +44,8 @@ from ..tasks.status import MotionStatus
 from ..tasks.task import GivenBase, Task, read_task
 from .fastest_law import FastestLaw
 from .parametrised_path import ParametrisedPath, PathLimits
-from .phase_plane import PhasePlane, phase_plane, proofs
+from .phase_plane import proofs
+from .piece import RESERVE, Piece, solved_piece
 from .timed_task import ACCELERATIONS, KNOWN_LIMITS, SPEEDS, check_task
 
 ATTEMPTS = 12
@@ -52,7 +53,6 @@ MOST_INTERVALS = 6400
 SPLIT = 0.25, 0.5, 0.75  # of an interval in which much is missing: further points
 MOST_SPLITS = 3  # times that such intervals are split
 FINER_TRIES = 2  # after a grid on which the search ended without a law
-RESERVE = 1e-7  # of the weight, kept from the tension limits against rounding
 LARGEST_RESERVE = 0.01  # of the weight
 LITTLE = 1e-4  # of the weight: if no more than this is missing anywhere, it becomes a reserve everywhere
 LARGEST_SHRINK = 0.01
@@ -62,7 +62,6 @@ NEAR_REST = 0.5 ** np.arange(7.0, 0.0, -1.0)  # of the interval beside a rest, w
 CLOSEST = 1e-3  # of a step of a grid: points that are nearer to each other are one
 FINEST = 1e-2  # of that, for points that split an interval
 COARSE_EXCESS = 1e-4  # of a limit: if it is exceeded by more it takes a finer grid, if by less some distance everywhere
-MOST_CUTS = 24  # times that half-planes of motors are added
 PIECES = (400, 800, 1600)  # of a spline through points of a path, until it is near enough
 LOOKS = 20_001
 ON_PATH = 2e-6  # of a path's length: how far that spline may be off
@@ -78,8 +77,9 @@ def time_along(robot: AnyRobot, task: Task | dict[str, Any] | str | os.PathLike[
     turn; for all other paths the task's duration is ignored. Carriers rest or follow given paths with the same
     parameter s.
 
-    The task's limits on speeds and accelerations of platform, cables and carriers apply, and the robot file's limits of
-    winches and of mobile carriers that move. If winches have inertia, `force_max` limits the sum of the tension and the
+    The task's limits on speeds and accelerations of platform, cables and carriers, and on the power of winches, apply,
+    and the robot file's limits of winches and of mobile carriers that move. A law that keeps `winch_power` is a local
+    optimum. If winches have inertia, `force_max` limits the sum of the tension and the
     force that accelerates the winch. The tension limits, reduced by the task's margin, enter as the facets of the
     available wrench set. TOPP-RA computes the time law (H. Pham, Q.-C. Pham, "A new approach to time-optimal path
     parameterization based on reachability analysis", IEEE T-RO 34(3), 2018): d2s/dt2 is constant between grid points,
@@ -123,7 +123,8 @@ def _limits(robot: Robot, task: Task, moving: list[int]) -> PathLimits:
         if limit.name in KNOWN_LIMITS and (not limit.name.startswith("carrier") or limit.labels[0] in names)
     ]
     parts = (tuple(limit for limit in kept if limit.name in names) for names in (SPEEDS, ACCELERATIONS))
-    return PathLimits(*(Limits(robot, part) for part in parts))
+    speeds, accelerations = (Limits(robot, part) for part in parts)
+    return PathLimits(speeds, accelerations, task.limits.winch_power or np.inf)
 
 
 def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, intervals: int) -> Plan:
@@ -137,7 +138,7 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
         attempts += 1
         rises = np.concatenate([[], *(parametrised.rises(zone, RISE / intervals) for zone in zones)])
         grids = [_through(s, corners, np.append(rises, _rests(s)), further) for s in parametrised.pieces(intervals)]
-        pieces = [_piece(parametrised, limits, s, margin, _reserve(s, short, weight), shrink) for s in grids]
+        pieces = [solved_piece(parametrised, limits, s, margin, _reserve(s, short, weight), shrink) for s in grids]
         s = np.concatenate([pieces[0].s[:1], *(piece.s[1:] for piece in pieces)])
         law = FastestLaw(parametrised, limits, margin, s, np.full(len(s), np.nan))
         if failures == 0 and (proven := _proven(law, pieces)) is not None:
@@ -279,43 +280,7 @@ def _reserve(s: np.ndarray, short: list[_Stretches], weight: float) -> np.ndarra
     return np.minimum(reserve, LARGEST_RESERVE * weight)
 
 
-class _Piece(NamedTuple):
-    """A piece of the path from one rest to the next."""
-
-    s: np.ndarray
-    inside: np.ndarray  # the same places, the last one taken as the end of this piece, not as the start of the next
-    plane: PhasePlane
-    law: Any
-
-
-def _piece(
-    parametrised: ParametrisedPath, limits: PathLimits, s: np.ndarray, margin: float, reserve: np.ndarray, shrink: float
-) -> _Piece:
-    """Solve one piece.
-
-    A motor limits a tension by less than the cable does only while it accelerates its winch. Which motors do that is
-    not known beforehand: those half-planes of theirs that a law exceeds somewhere are added until it exceeds none.
-    """
-    fastest, Rows = _toppra()
-    inside = s if s[-1] == 1 else np.append(s[:-1], np.nextafter(s[-1], 0.0))
-    plane, weight = phase_plane(parametrised, limits, inside, margin, reserve, shrink), parametrised.robot.force_scale
-    rows = plane.rows(weight)
-    law = fastest(s - s[0], Rows(*rows, plane.x_max))
-    for _ in range(MOST_CUTS):
-        if plane.winches is None or law.x is None or law.unlimited:
-            break
-        known, u, x = rows[0].shape[1], np.diff(law.x) / (2 * np.diff(s)), law.x[:, None]
-        for each in (np.append(u, u[-1]), np.append(u[0], u)):  # those after and before each point
-            a, b, c = plane.winch_rows(plane.winches.short(each, law.x), weight)
-            beyond = (a * each[:, None] + b * x + c > RESERVE).any(axis=0)
-            rows = tuple(np.hstack([part, its[:, beyond]]) for part, its in zip(rows, (a, b, c), strict=True))
-        if rows[0].shape[1] == known:
-            break
-        law = fastest(s - s[0], Rows(*rows, plane.x_max))
-    return _Piece(s, inside, plane, law)
-
-
-def _proven(law: FastestLaw, pieces: list[_Piece]) -> FastestLaw | None:
+def _proven(law: FastestLaw, pieces: list[Piece]) -> FastestLaw | None:
     """Return where no speed and acceleration are possible, with the proof of the worst point; None if nowhere."""
     weight = law.parametrised.robot.force_scale
     proven = [
@@ -329,18 +294,6 @@ def _proven(law: FastestLaw, pieces: list[_Piece]) -> FastestLaw | None:
     worst = max(proven, key=lambda each: each.certificate.shortfall)
     blocked = np.array([each.s for each in proven])
     return replace(law, at=worst.s, certificate=worst.certificate, problem=worst.problem, blocked=blocked)
-
-
-def _toppra() -> tuple[Any, Any]:
-    try:
-        from .toppra_law import Rows, fastest
-    except ModuleNotFoundError as error:
-        if (error.name or "").partition(".")[0] != "toppra":
-            raise
-        raise SolverError(
-            "time_along: toppra is not installed; install the extra timing: pip install 'towline[timing]'"
-        ) from None
-    return fastest, Rows
 
 
 def geometry(path: AnyPath, *, alone: bool) -> Curve:

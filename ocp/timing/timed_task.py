@@ -8,7 +8,8 @@ from ..tasks.wind_set import WindBox, WindDisc
 
 SPEEDS = ("platform_speed", "zone_speed", "cable_speed", "carrier_speed")
 ACCELERATIONS = ("platform_acceleration", "platform_lateral_acceleration", "cable_acceleration", "carrier_acceleration")
-KNOWN_LIMITS = (*SPEEDS, *ACCELERATIONS)
+WITHOUT_POWER = (*SPEEDS, *ACCELERATIONS)
+KNOWN_LIMITS = (*WITHOUT_POWER, "winch_power")
 
 
 def check_task(robot: Robot, task: Task) -> None:
