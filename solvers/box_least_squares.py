@@ -32,7 +32,7 @@ class Projection(NamedTuple):
     # Tensions inside the limits whose wrench is nearest to w [N], shape (m,). The wrench is unique, they need not be.
     closest: Array
     # The remaining error of the wrench, S (w - A closest) [N], shape (n,), orthogonal to the last digit to every cable
-    # that is not at a limit. It has that accuracy relative to its own length, however short it is beside w.
+    # that is not at a limit. It has that accuracy relative to its own length, however short it is compared with w.
     residual: Array
 
 

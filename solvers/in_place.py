@@ -11,7 +11,7 @@ from .problem import Array, TensionProblem
 from .solve import solve
 from .status import INFEASIBLE, INVALID, OPTIMAL, SINGULAR, UNSURE
 
-RHO = 1e8  # weight of the squared wrench error in a soft solution, beside the squared tensions
+RHO = 1e8  # weight of the squared wrench error in a soft solution, relative to the squared tensions
 
 # With up to so many more cables than equations lanes are as quick for one row and several times as quick for many. With
 # more, one row takes 1.5 times as long. A row has the same bits alone and among others: the shape alone decides.

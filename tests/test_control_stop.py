@@ -298,8 +298,8 @@ def test_a_simulation_stops_at_an_event(made):
     last = run.references[-1]
     np.testing.assert_allclose(last.pose, its.platform[0][-1], atol=1e-6)
     np.testing.assert_allclose(last.velocity, 0.0, atol=1e-9)
-    size = f"(within {its.duration:.4g} s and {its.distance:.4g} m) at {at:.4g} s"
-    assert f"the reference began to stop {size}" in run.report()
+    size = f"{its.duration:.4g} s and {its.distance:.4g} m at {at:.4g} s"
+    assert f"the reference began a stop of {size}" in run.report()
     both = simulate(robot, found, events=[f"stop at {at:.6f}"], runs=2)
     assert both["passed"].values.all()
 

@@ -147,7 +147,7 @@ def _of_noise(result: CalibrationData) -> list[str]:
         free = ",".join(name for name in GROUPS if name in (kept[0], *result.free))
         held = f"hold only if the file's {kept[0]} are exact"
         if kept[0] == "anchors" and result.measurements.carrier_poses is None:
-            size = "" if known else f" of {_mm(usual_error(result._solved.model))}"
+            size = "" if known else f" of {_mm(usual_error(result._solved.model))} (assumed)"
             held = f"include errors{size} of the file's anchors"
         lines.append(
             f"{why}the standard deviations below {held}; with --free {free} --prior {kept[0]}=0.02 they include errors "

@@ -25,11 +25,11 @@ class StopReference(Event):
 
     kind: Literal["stop"] = "stop"
     short: ClassVar[str] = "stop"
-    _size: str = PrivateAttr(default="")  # duration and distance
+    _stop: str = PrivateAttr(default="to stop")  # later with duration and distance
 
     @override
     def describe(self, robot: Robot) -> str:
-        return f"the reference began to stop{self._size}"
+        return f"the reference began {self._stop}"
 
     @override
     def follow(self, robot: Robot, trajectory: Trajectory, time: float) -> Trajectory | None:
@@ -37,7 +37,7 @@ class StopReference(Event):
         if trajectory.duration is None:
             return None  # a pose
         halt = stop_along(robot, trajectory, time)
-        self._size = f" (within {quantity(halt.duration, 's')} and {quantity(halt.distance, 'm')})"
+        self._stop = f"a stop of {quantity(halt.duration, 's')} and {quantity(halt.distance, 'm')}"
         return read_trajectory(robot, halt, None)._replace(doubt="" if halt.feasible else BEYOND)
 
 

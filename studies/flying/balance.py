@@ -63,7 +63,7 @@ def _moments(dynamics: Dynamics, samples: Instants, true: np.ndarray, J: np.ndar
     printed = printed_acceleration(*samples.base), printed_acceleration(*samples.body)
     last = _moment_off(dynamics, samples, *exact, last=samples.R_B.rate)
     off, with_printed = (_moment_off(dynamics, samples, *parts) for parts in (exact, printed))
-    # [R_B b x u] (T' + F') with T' = dT, as step 7 needs it, and F' = F = T + dT, beside the moment of T + dT.
+    # [R_B b x u] (T' + F') with T' = dT, as step 7 needs it, and F' = F = T + dT, compared with the moment of T + dT.
     T = steady_tensions(dynamics, samples.body, samples.base)
     twice, once = (turn(J[:, 3:], T + count * INCREMENTS) for count in (2, 1))
     # The left side of Eq. 34 has dTheta_b, as printed, in place of ddTheta_b.
@@ -109,12 +109,12 @@ def _frames(dynamics: Dynamics, samples: Instants, true: np.ndarray, J: np.ndarr
     R_A, R_B = samples.R_A.R, samples.R_B.R.transpose(0, 2, 1)  # R_B turns rows, from the right
     in_A = dynamics.relative.required_wrench(*samples.body, *samples.base)  # M ddX + F + D_B
     turned = np.hstack([turn(R_A, in_A[:, :3]), turn(R_A, in_A[:, 3:])])
-    # u in {A} beside u = L / l in {G}, which Eq. 26 uses among vectors in {A}.
+    # u in {A} compared with u = L / l in {G}, which Eq. 26 uses among vectors in {A}.
     u = J[:, :3].transpose(0, 2, 1)  # (n, m, 3)
     apart = np.degrees(np.arccos(np.clip((u * (u @ R_A.transpose(0, 2, 1))).sum(axis=-1), -1, 1)))
     force = dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), WIND)[:3]
     felt = turn_back(R_A, np.tile(force, (len(samples.base.pose), 1)))
-    # R_B r_B x u of Eq. 37, where r_B = R_B b is already rotated, beside R_B b x u.
+    # R_B r_B x u of Eq. 37, where r_B = R_B b is already rotated, compared with R_B b x u.
     arms = dynamics.robot.attachments @ R_B
     return [
         claim("eq-38").compared(np.abs(turned - true).max()),

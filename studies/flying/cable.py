@@ -48,13 +48,13 @@ def _elongation(robot: Robot) -> Claim:
 
 
 def _stiffness(robot: Robot) -> list[Claim]:
-    # Chains of n elements beside the whole cable, E A / l times the elongation.
+    # Chains of n elements compared with the whole cable, E A / l times the elongation.
     whole, cable, double = (chain(robot, n) for n in (1, 8, 2))
     increments = {n: chain(robot, n).end_increment(STRETCH * whole.direction) for n in ELEMENTS}
     spread = max(increments.values()) - min(increments.values())
-    # The force of an element that is lengthened by de beside E A / de times de, as in Eq. 15.
+    # The force of an element that is lengthened by de compared with E A / de times de, as in Eq. 15.
     held = cable.node_forces(np.zeros((cable.elements + 1, 3)), WINDING)[-1] @ cable.direction
-    # The direction of x_c in {G} by the row u^T of Eq. 17 beside the direction of the cable.
+    # The direction of x_c in {G} by the row u^T of Eq. 17 compared with the direction of the cable.
     vector = robot.anchors[0] - robot.home_attachments[0]  # L by Eq. 4
     # K_n of two elements, from the blocks k_1 to k_4 of Eq. 19, besides the K_n of the chain.
     block = double.stiffness * double.elements / double.length * np.outer(double.direction, double.direction)

@@ -29,10 +29,10 @@ def chapter() -> Chapter:
     angle = np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]))
     radius_and_turns = np.linalg.norm(arm[:, :2], axis=1).mean(), np.ptp(angle) / (2 * np.pi)
     change = _change_with_attitude(dynamics)
-    # Lengths beside a sine; the printed pairing has lengths though its J has no inverse.
+    # Lengths compared with a sine; the printed pairing has lengths though its J has no inverse.
     printed = Dynamics(load("wang-flying-printed")).cable_lengths(body.pose)
     off, others = (off_sine(TIMES, each).max() for each in (printed, lengths))
-    # Tensions beside a sine, of every pairing that holds the platform at the centre.
+    # Tensions compared with a sine, of every pairing that holds the platform at the centre.
     held = tensions_of(circle(RADIUS, TURN), PAIRINGS[at_centre().taut])
     most = off_sine(TURN, held.reshape(len(TURN), -1)).reshape(held.shape[1:]).max(axis=1)
     claims = [

@@ -39,7 +39,7 @@ def chapter() -> Chapter:
     # m r^2 is the largest I_z that a body within the radius r can have.
     reach = max(PRINTED["r_B"], float(np.sqrt(PRINTED["S"] / np.pi)))
     most = m_B * reach**2
-    # The signs of z in {A} beside the heights in {G}.
+    # The signs of z in {A} compared with the heights in {G}.
     centre = CIRCLE - QUADROTOR
     claims = [
         claim("table-1-rigid").stated(others, I_z <= others, printed=I_z),

@@ -62,7 +62,7 @@ def _rates(samples: Instants) -> list[Claim]:
     printed = printed_acceleration(*samples.base)
     ours = printed - acceleration[:, 3:] + body_rates(pose, acceleration[:, 3:])
     off = relative_error(printed, A.acceleration)
-    # R_A (alpha_A + R alpha_B + omega_A x R Omega) beside the second derivative of R_A R.
+    # R_A (alpha_A + R alpha_B + omega_A x R Omega) compared with the second derivative of R_A R.
     whole = A.then(B)  # {B} in {G}; both accelerations of Eq. 32 are in {B}
     inner = A.acceleration + turn(B.R, B.acceleration) + np.cross(A.rate, turn(B.R, B.rate))
     composed = np.abs(turn(A.R, inner) - turn(whole.R, whole.acceleration)).max()

@@ -1,4 +1,4 @@
-"""Paper F's section V beside the elastic plant: the same vibration, the tensions of a simulation and the procedure's.
+"""Paper F's section V and the elastic plant: the same vibration, the tensions of a simulation and the procedure's.
 
 The platform moves on the circle of radius 0.15 m under a hovering quadrotor, by commanded lengths (`wound`), once still
 and once shaken by a small force along each axis, at 5, 6 and 7 Hz as in `vibration`. What the force adds to the pose is

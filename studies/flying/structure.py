@@ -47,7 +47,7 @@ def _points(samples: Instants) -> list[Claim]:
     dynamics, robot = Dynamics(load("wang-flying")), load("wang-flying")
     x_A, x_b = samples.base.pose[:, None, :3], samples.body.pose[:, None, :3]
     R_A, R_B = samples.R_A.R.transpose(0, 2, 1), samples.R_B.R.transpose(0, 2, 1)  # of rows, from the right
-    # A_i and B_i in {G} by Eqs. 2 and 3, (n, 6, 3) each [m], beside the points of the model at the world poses.
+    # A_i and B_i in {G} by Eqs. 2 and 3, (n, 6, 3) each [m], compared with the points of the model at the world poses.
     anchors, ends = robot.anchors @ R_A + x_A, x_b @ R_A + robot.attachments @ R_B @ R_A + x_A
     world, _, _ = dynamics.relative.motion_in_world(*samples.body, *samples.base)
     own = np.concatenate(dynamics.points(world, samples.base.pose[:, None]), axis=1)

@@ -54,7 +54,7 @@ def _body() -> list[Claim]:
     distances = np.linalg.norm(lines(robot, pose)[0], axis=1)
     moments = np.sort(np.diag(robot.inertia))
     others = moments[:2].sum()
-    # R I R^T beside the inertia of rotated point masses.
+    # R I R^T compared with the inertia of rotated point masses.
     points = masses() @ turn.T
     share, step = robot.platform.mass / len(points), 1e-4
     summed = share * ((points**2).sum() * np.eye(3) - points.T @ points)
@@ -63,7 +63,7 @@ def _body() -> list[Claim]:
         places = move[:3] + (Rotation.from_rotvec(move[3:]) * TURN).apply(masses())
         return float(-share * (places @ np.array(robot.gravity)).sum())
 
-    # G beside minus the slope of the potential energy of point masses, by position and by rotation.
+    # G compared with minus the slope of the potential energy of point masses, by position and by rotation.
     slope = [(energy(-row) - energy(row)) / (2 * step) for row in step * np.eye(6)]
     return [
         claim("eq-3-rotation").compared(Dynamics(robot).cable_lengths(pose), printed=distances),
@@ -98,7 +98,7 @@ def _forces() -> list[Claim]:
     apart = np.abs(left_out - np.cross(omega, inertia @ omega)).max()
     # Static tensions at home with the printed e_i, which point from the robot to the load.
     tensions = np.linalg.solve(-dynamics.wrench_matrix(robot.home)[:3], [0.0, 0.0, robot.weight])
-    # R_p (P_i - b_i) / |L_i|, the second form without P_i in {P}, beside the moment of the first form.
+    # R_p (P_i - b_i) / |L_i|, the second form without P_i in {P}, compared with the moment of the first form.
     vectors, arms = lines(robot, pose)
     e = -vectors / np.linalg.norm(vectors, axis=1)[:, None]  # along P_i - b_i
     first, second = (np.linalg.norm(moments, axis=1).max() for moments in (np.cross(arms, e), TURN.apply(e)))
