@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 _alone = threading.Lock()
 LARGEST = 4_000_000_000  # [bytes]; an hour of a flight with a sample each millisecond
-# Of motions and their tensions, of the platform and of carriers.
+# Units of motions of platform and carriers, and of tensions.
 UNITS = {"time": "s", "pose": "m, rad", "velocity": "m/s, rad/s", "acceleration": "m/s^2, rad/s^2", "tensions": "N"}
 
 

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 KINDS = ("feasible", "infeasible", "rank-deficient", "soft")
 T_MIN = 0.01
-STIFFNESS = 1e3  # What a missing wrench costs in soft problems, relative to the same tension.
+STIFFNESS = 1e3  # Cost of a missing wrench in soft problems, relative to the same tension.
 
 
 class Task(NamedTuple):

@@ -59,7 +59,7 @@ def tension(
     air = None if wind is None else numbers("--wind", wind, 3)
     problem = pose_problem(Dynamics(loaded), place, rate, rate_rate, carriers, wind=air)
     at = {"pose": place.tolist(), "wrench": problem.w.tolist()}
-    # Of a wrong method or back end, report before the others compute.
+    # Report a wrong method or back end before the others compute.
     solution = _solve(problem, method, backend)
     solutions = {method: solution, **{name: _solve(problem, name) for name in methods() if name != method}}
     if as_json:

@@ -60,10 +60,10 @@ class Usual(NamedTuple):
     most: float = 1.0  # times bandwidth and observer, if the sensors permit it
 
 
-# Of `ComputedTorque`: with fewer cables than degrees of freedom, whose loads swing, and with others.
+# For `ComputedTorque`: with fewer cables than degrees of freedom, whose loads swing, and with others.
 SWINGING, HELD = Usual(1.5, 10.0, 6.0, np.inf), Usual(10.0, 10.0, 6.0, np.inf, 2.0)
-# Of `Predictive`: carriers that correct errors, with cables of fixed length or with winches; those that may leave their
-# reference, and are slower than tensions; and those that stay.
+# For `Predictive`: carriers that correct errors, with cables of fixed length or with winches; carriers that may leave
+# their reference, and are slower than tensions; and carriers that stay.
 TEAM, TOWING = Usual(8.0, 20.0, 6.0, 0.025), Usual(6.0, 20.0, 6.0, 0.025)
 PATIENT, STILL = Usual(40.0, 60.0, 2.0, 0.03), Usual(40.0, 60.0, 2.0, 0.015)
 

@@ -32,7 +32,7 @@ def _orders(*coefficients: float) -> list[np.polynomial.Polynomial]:
     return [np.polynomial.Polynomial(coefficients).deriv(order) for order in range(3)]
 
 
-# Of an offset of 1, and of one with a rate of 1, at the beginning, both without acceleration, that end at rest at 0.
+# Polynomials that begin with an offset of 1, or with a rate of 1, without acceleration, and end at rest at 0.
 FADES = _orders(1, 0, 0, -10, 15, -6), _orders(0, 1, 0, -6, 8, -3)
 
 

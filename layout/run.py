@@ -83,7 +83,7 @@ def design(
         wanted = wanted.model_copy(update={"margin": min(wanted.margin, USUAL_SHARE * chosen.force_scale)})
     variables, _ = variables_of(chosen, wanted), room_of(chosen, wanted)
     grid = rows_of(chosen, wanted.require, [each.places() for each in wanted.require])
-    # Of other pairings the boxes of the robot's own points prove nothing.
+    # The boxes of the robot's own points prove nothing about other pairings.
     impossible = None if wanted.free[0].pairing else find_impossibility(variables, grid)
     if impossible is not None:
         before, clearance = judged_margin(chosen, chosen.length, grid), judge(chosen, grid, NO_BOUNDS, False).clearance

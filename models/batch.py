@@ -96,7 +96,7 @@ def in_blocks(block: ca.Function, arguments: list[np.ndarray], size: int = BLOCK
     column. Raises `RuntimeError` if the evaluation fails.
     """
     n = len(arguments[0])
-    # Of a broadcast argument and one row more NumPy makes columns, which no buffer takes.
+    # NumPy joins a broadcast argument and one more row by columns, which no buffer takes.
     whole = [
         np.ascontiguousarray(np.concatenate([each, np.repeat(each[-1:], -n % size, axis=0)])) for each in arguments
     ]

@@ -126,7 +126,7 @@ class Mechanics:
             return
 
         def run(start: int, stop: int) -> None:
-            # What has not a row for each is None, or one row for all.
+            # Arguments without a row for each pose are None, or one row for all.
             rows = [a if a is None or a.size % count else a.reshape(count, -1)[start:stop] for a in arrays]
             function(self._record, *rows)
 

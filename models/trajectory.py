@@ -30,7 +30,7 @@ class Trajectory(NamedTuple):
     keep_out: Sequence[Sequence[np.ndarray]] = ()
     doubt: str = ""  # row of the report that says that the reference is a plan with a broken limit; empty if it is not
     wind: np.ndarray | None = None  # velocity of the air in {G} for which it is planned, (3,) [m/s]; None without air
-    # What the platform carries from a time on [s]; None for nothing.
+    # Load of the platform from a time on [s]; None for no load.
     loads: Sequence[tuple[float, RigidLoad | None]] = ()
 
     def load_at(self, time: float) -> RigidLoad | None:

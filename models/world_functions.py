@@ -113,7 +113,7 @@ def _slopes(values: Matrix, of: WorldFunctions) -> Matrix:
 
 _PLACE, _PULLED, _STATE = "pose carrier_pose", "pose tensions carrier_pose", "pose velocity tensions carrier_pose"
 _MOTION = " ".join(Motion._fields)
-# Of each function its inputs, and its outputs by name.
+# The inputs of each function, and its outputs by name.
 _DEFINITIONS: dict[str, tuple[str, Callable[[WorldFunctions], dict[str, Matrix]]]] = {
     "wrench_matrix": (_PLACE, lambda of: {"A": of._A}),  # (6, m)
     "cable_lengths": (_PLACE, lambda of: {"lengths": of._exit.lengths}),  # (m, 1)

@@ -61,7 +61,7 @@ class Orders:
             self._starts = carriers[..., first:].reshape(len(seeds), count, 3, 6)
             self._begins: Motion = (self._starts[:, :, 0], self._starts[:, :, 1], self._starts[:, :, 2])
             self._ends = blocks[:, 1, :, first:].reshape(len(seeds), count, 3, 6)
-            # What a constant acceleration misses of the next reference: pose, velocity and acceleration, (K, 3, c, 6).
+            # Deviation of a constant acceleration from the next reference: pose, velocity, acceleration, (K, 3, c, 6).
             motion = np.array([reference[3:6] for reference in conditions.references])
             missed = np.zeros_like(motion)
             pose, velocity, acceleration = np.moveaxis(motion[:-1], 1, 0)

@@ -9,7 +9,7 @@ from ..estimation.calibration.geometry import length_of
 from .replayed_robot import Parameters
 from .windows import Windows
 
-# Of each parameter: its smallest and largest value, and the step of its derivative; for the CoM over the platform's
+# For each parameter: its smallest and largest value, and the step of its derivative; for the CoM over the platform's
 # length, for anchors over the cables' length.
 RANGES = {
     "delay": (-0.2, 0.2, 1e-3),
@@ -165,7 +165,7 @@ class Matching:
             kept = values > least  # not changed along directions that the recording does not show
             inverse = (along_of[:, kept] / values[kept]) @ along_of[:, kept].T
             change = -inverse @ along.sum(axis=0)
-            # What as much noise again would change, also on average: simulated tensions end at zero.
+            # Change by as much noise again, also on average, because simulated tensions end at zero.
             echo = np.einsum("iwr,wr->i", slope, self._echoed[used])
             scatter = np.vstack([along + steep @ change, echo]) @ inverse
             sigma = np.sqrt(np.sum(scatter**2, axis=0))

@@ -86,7 +86,7 @@ class Extremes:
         result["error_max"], result["outside"] = np.sqrt(self._largest), self._outside
         for name, each in (("tension_min", self._least), ("tension_max", self._most.max(axis=1))):
             result[name] = np.where(np.isinf(each), 0.0, each)
-        # Of fewer periods than parts, some have none and keep the values before.
+        # With fewer periods than parts, some parts have none and keep the values before.
         filled = np.unique(np.arange(len(self._references)) * PARTS // len(self._references))
         over_time = self._over_time[:, filled[np.searchsorted(filled, np.arange(PARTS), side="right") - 1]]
         over_time[..., 0], over_time[..., 1] = np.sqrt(over_time[..., 0]), -over_time[..., 1]

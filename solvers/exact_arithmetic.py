@@ -25,7 +25,7 @@ from .box_least_squares import Projection
 from .problem import Array, TensionProblem, accepted_error
 
 # Relative error of the wrench at an optimum where the cost is proportional to the wrench: 1e-22, far below rounding.
-# Where the cost is K times as sensitive the error is K times as large.
+# If the cost is K times as sensitive, the error is K times as large.
 _ERROR = 2.0**-73
 
 

@@ -105,7 +105,7 @@ def _prove(problem: TensionProblem, singular: bool) -> Certificate | None:
     projection = project(problem)
     certificate = sharpest(problem, projection)
     if certificate is None or certificate.singular is not singular:
-        # Where the projection cancels huge tensions, its own rounding hides a shortfall that others do not.
+        # If the projection cancels huge tensions, its own rounding hides a shortfall that other tensions show.
         others = projection._replace(closest=np.minimum(np.maximum(problem.t_min, 0.0), problem.t_max))
         direction = _direction_of_core(problem)
         if direction is not None:

@@ -37,4 +37,4 @@ STATUSES = tuple(Status)
 OPTIMAL, INFEASIBLE, SINGULAR, INACCURATE, INVALID, FAILED = range(len(STATUSES))
 
 UNSURE = len(STATUSES)
-"""Of a problem that the C core is to solve, or that it could not: see `core/batch/batch.h`."""
+"""Status of a problem that the C core is to solve, or that it could not: see `core/batch/batch.h`."""

@@ -99,7 +99,7 @@ def _face(problem: TensionProblem, form: StandardForm, exact: Array) -> TensionP
     held = np.flatnonzero(low | high)
     stays = held
     if held.size:
-        # Of all changes that leave the wrench as it is and cross no limit, one that moves as many of these as can move.
+        # A change that leaves the wrench as it is, crosses no limit, and moves as many of these as can move.
         changes = form._replace(b=0.0 * form.b, lower=np.where(low, 0.0, -np.inf), upper=np.where(high, 0.0, np.inf))
         moved = np.eye(s.size)[held] * np.where(low, -1.0, 1.0)
         rows = np.hstack([moved, np.eye(held.size)])

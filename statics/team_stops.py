@@ -38,7 +38,7 @@ TILTS = 3  # times that positions are computed from tilts, which follow from acc
 INSTANT = 1e-4  # [s], for differences of attitudes
 MOST_FADING = 4.0, 20.0  # derivatives of log(tension) at the end of a plan [1/s, 1/s^2]: larger ones are noise
 SLACK = 1e-4  # of the largest tension: smallest tension at the end of a plan
-# Of s = t / duration, with three continuous derivatives, and with five, since anchors that turn need two more.
+# Polynomials of s = t / duration with three continuous derivatives, and with five, as anchors that turn need two more.
 RATE = np.polynomial.Polynomial([1, 0, 0, 0, -35, 84, -70, 20])
 SMOOTHER = np.polynomial.Polynomial([1, 0, 0, 0, 0, 0, -462, 1980, -3465, 3080, -1386, 252])
 

@@ -75,7 +75,7 @@ def largest_box(
     lasts = [np.arange(at, len(axis)) for axis, at in zip(axes, middle, strict=True)]
     # The last of all first along z: of boxes without a volume the narrowest and highest is found.
     firsts[2], lasts[2] = firsts[2][::-1], lasts[2][::-1]
-    # How many nodes are not able, in all boxes that begin at the corner of the grid, then in those about the middle.
+    # Counts of nodes that are not able, in all boxes that begin at the grid's corner, then in boxes about the middle.
     unable = np.pad((~able).cumsum(0).cumsum(1).cumsum(2), ((1, 0),) * 3)
     for first, last in zip(firsts, lasts, strict=True):
         unable = np.moveaxis(unable[last + 1] - unable[first][:, None], (0, 1), (-2, -1))

@@ -65,7 +65,7 @@ def cells_of(extent: np.ndarray, most: int) -> tuple[int, ...]:
     left = float(most)
     for position, axis in enumerate(order):
         rest = order[position:]
-        # Of d remaining axes: the edge of a cube of which `left` fill their box; the root may be off by an ulp.
+        # With d axes left: the edge of a cube of which `left` fill their box; the root may be off by an ulp.
         edge = float(np.exp((np.log(extent[rest]).sum() - np.log(left)) / len(rest)))
         counts[axis] = max(1, int(extent[axis] / edge * (1 + 1e-12)))
         left /= counts[axis]

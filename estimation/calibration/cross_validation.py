@@ -289,7 +289,7 @@ def _mean_square(model: Model, state: State) -> float:
     unknown = np.isinf(model.pose_sigmas)
     absorbed = unknown.sum(axis=1)
     if model.balanced or model.measurements.directions is not None:
-        # Of poses that need forces or directions too, lengths cannot absorb more errors than there are of them.
+        # For poses that need forces or directions too, lengths cannot absorb more errors than there are lengths.
         absorbed = np.minimum(absorbed, model.robot.m - 1)
     return squares / max(int(np.maximum(used.sum(axis=0) - absorbed, 0).sum()), 1)
 

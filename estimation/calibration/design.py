@@ -77,7 +77,7 @@ def _rows(robot: Robot, groups: tuple[str, ...], poses: np.ndarray, measured: bo
         Parameters(robot, groups), Measurements(lengths, poses), {}, np.ones((robot.m, len(poses)), dtype=bool)
     )
     state = model.begin()
-    # Of scales: the readings of these poses.
+    # For scales: the readings at these poses.
     readings = -model.residuals(state).readings.T * model.measurements.sigma.lengths
     table = model.parameters.table(state.x)
     readings = lengths - readings / table[:, 7]

@@ -96,7 +96,7 @@ def fit(model: Model, state: State, length: float, steps: int = MOST_STEPS, enou
                 continue
         # A step along open directions may cost a little: they are straight lines only nearby.
         if new - cost <= SMALL * (1 + cost) if negligible else new <= cost and size <= FARTHEST * length:
-            # Where nothing more is expected, a step without damping shows whether that is so.
+            # If no more reduction is expected, a step without damping shows whether that is so.
             damping.accept(0.0 if negligible else (cost - new) / expected)
             damping.factor *= not negligible
             state, cost, at_best = tried, new, settles

@@ -53,7 +53,7 @@ class Frames(NamedTuple):
         ):
             angle = float(np.linalg.norm(Rotation.from_matrix(turn).as_rotvec()))
             if angle > 1e-9 or shift.any():
-                # What stands there is how the measured frame lies in the file's: T, and the inverse of B.
+                # The pose of the measured frame in the file's: T, and the inverse of B.
                 back = (shift, turn) if not texts and what.endswith("that is") else (-turn.T @ shift, turn.T)
                 about = Rotation.from_matrix(back[1]).as_rotvec() / max(angle, 1e-12)
                 texts.append(

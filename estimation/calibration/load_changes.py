@@ -28,7 +28,7 @@ def load_changes(model: Model, state: State) -> list[tuple[int, float]]:
         basis, size, _ = np.linalg.svd(whole, full_matrices=False)
         basis = basis[:, size > 1e-6 * size[0]]
         left = y - basis @ (basis.T @ y)
-        # Of a step after k samples: its square, and its product with the masses, without what the basis explains.
+        # For a step after k samples: its square, and its product with the masses, without what the basis explains.
         square = k - (np.cumsum(basis, axis=0)[k - 1] ** 2).sum(axis=1)
         k, square = (one[square > APART * k * (1 - k / len(y))] for one in (k, square))
         if k.size:

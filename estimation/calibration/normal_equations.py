@@ -58,7 +58,7 @@ def metric(model: Model) -> np.ndarray:
 
 
 class Diagonals(NamedTuple):
-    """Of J'J [1/m^2], (p,), and of each C_k [1/m^2, 1/rad^2], (N, 6)."""
+    """Diagonals of J'J [1/m^2], (p,), and of each C_k [1/m^2, 1/rad^2], (N, 6)."""
 
     parameters: np.ndarray
     poses: np.ndarray

@@ -147,7 +147,7 @@ def solve(
     slips: list[Slip] = []
     for _ in range(ROUNDS if outliers else 0):
         found, left = find_outliers(model, result.state)
-        # Where more than a few readings look wrong, something lasts: they are looked at only if it is no slip.
+        # If more than a few readings look wrong, something lasts: they are looked at only if it is no slip.
         many = len(found) > max(2, FEW * len(measurements))
         sought = (many or not found) and len(slips) < MOST_SLIPS and robot.fixed_lengths is None
         candidates = find_slips(model, result.state, length) if sought else []

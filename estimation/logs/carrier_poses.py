@@ -38,7 +38,7 @@ def _plausible(robot: Robot, thrusts: np.ndarray, names: Sequence[str], notes: l
     `names` are the names of their fields, for a map.
     """
     result, gravity = thrusts.copy(), float(np.linalg.norm(robot.gravity))
-    # In hover all thrusts together hold all weights, which gives the unit of those from 0 to 1.
+    # In hover all thrusts together hold all weights, which gives the unit of thrusts from 0 to 1.
     flying = [i for i, carrier in enumerate(robot.carriers) if carrier.actuators and np.isfinite(thrusts[:, i]).any()]
     driven = [i for i in flying if np.nanmedian(thrusts[:, i]) != 0]
     count = sum(bool(carrier.actuators) for carrier in robot.carriers)

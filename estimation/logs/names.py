@@ -13,7 +13,7 @@ from ...base.csv_columns import ANGLES, LENGTHS, TIMES
 FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3, "kgf": 9.80665, "kg": 9.80665, "gf": 9.80665e-3, "g": 9.80665e-3}
 FORCES["lbf"] = 4.4482216152605
 NUMBERS = {"1": 1.0, "-": 1.0}
-# What turns of a drum are counted in; the scale of its encoder is in metres per unit of the reading.
+# Units in which turns of a drum are counted; the scale of its encoder is in metres per unit of the reading.
 COUNTS = dict.fromkeys(("rev", "turns", "counts", "ticks"), 1.0)
 UNITS = {
     "lengths": {**LENGTHS, **ANGLES, **COUNTS},
@@ -40,7 +40,7 @@ _DIRECTION = r"(?:dir(?:ection)?s?|(?:unit[_ ]?)?vec(?:tor)?s?|unit)"
 _CABLE = r"(?:cable|rope|wire|tether|winch|c)s?[_ ./]?\[?(?:cable )?(\d+)\]?"
 _DRUM = r"(?:cable|rope|wire|tether|winch(?:e?s)?|motor|axis|ax|drive|drum|encoder|enc|joint|actuator|[cmw])s?"
 _WINCH = rf"{_DRUM}[./_ ]?\[?(\d+)\]?[./_ ]"
-# What the sensor of a drum's motor reads.
+# Names of readings of the sensor of a drum's motor.
 TURNED = r"(?:act(?:ual)?)?(?:positions?|pos|angles?|theta|counts?|ticks?|incr(?:ements?)?)"
 _SENSOR = r"(?:load[_ ]?cell|lc|cable|rope|wire|winch|tension|force[_ ]?sensor|ft)"
 _NO_LENGTH = re.compile(r"tension|force|effort|speed|veloc|vel_|accel|current|torque|thrust|temp|status|error")
@@ -128,12 +128,12 @@ LETTERED["lengths"] += rf".*/position\[{_HELD}[_ ]{_CORNER}\]", rf".*/position\[
 DATES = 1e9, 4e9  # [s] from 1970, of recordings: 2001 to 2096
 LEAST_COUNTED, SLOWEST = 100.0, 0.5  # step of times that are no seconds; time between samples [s]
 MANY, LONG = 500, 3600.0  # samples, and [s] that so many would take, of a recording in milliseconds
-# What is commanded rather than measured: cmd_l0, length_0_ref, /winch_commands/position[0].
+# Names of commanded quantities: cmd_l0, length_0_ref, /winch_commands/position[0].
 _COMMAND = re.compile(
     r"[./_ ]?(?:cmd|commands?|commanded|desired|setpoints?|targets?|refs?|references?"
     r"|(?<![a-z])(?:des|sp|goals?|set(?=_?pos|[./_ ]|\d|$)))(?=[./_ \[]|\d|$|pos)"
 )
-# What is measured, of columns that say so beside others: x_gt, l1_meas, actual_length_1.
+# Names of measured quantities in tables that have others too: x_gt, l1_meas, actual_length_1.
 _MEASURED = re.compile(
     r"[./_ ]?(?<![a-z])(?:meas(?:ured)?|act(?:ual)?|fb|feedback|gt|ground[_ ]?truth|true"
     r"|mocap|vicon|optitrack|imu|ahrs)(?![a-z])"

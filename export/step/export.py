@@ -20,7 +20,7 @@ from .costs import costs, lines_of
 
 _TEMPLATE = Path(__file__).parent / "template"
 _CORE = Path(__file__).parents[2] / "core" / "distribution"
-# In the order in which each finds what it needs above it.
+# In this order each finds above it what it needs.
 _SECTIONS = (
     *("towline_core.h", "tolerances.h", "internal.h", "reduction.c", "standard_form.c", "slabs.c", "proof.c"),
     *("dual_active_set.c", "certificate.c", "towline_core.c"),

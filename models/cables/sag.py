@@ -211,7 +211,7 @@ def _compliance(h: np.ndarray, v: np.ndarray) -> np.ndarray:
     c_zz = b / T_2 - a / T_1
     c_xz = h / T_2 - h / T_1
     c_xx = 2 * _artanh(h, v, np.asarray(0.5), T_1, T_2) - c_zz
-    # Of a taut cable these are small differences; there three points of Gauss and Legendre are exact enough
+    # These are small differences for a taut cable; there three points of Gauss and Legendre are exact enough
     V = v[:, None] + _NODES / 2
     T = np.hypot(h[:, None], V)
     along = [(f / T**3) @ (_WEIGHTS / 2) for f in (V**2, -h[:, None] * V, h[:, None] ** 2 + 0 * V)]

@@ -20,7 +20,7 @@ MISSED = 0.1  # of the weight, which few cables cannot balance to the last bit; 
 
 
 class Kept(NamedTuple):
-    """By how much limits are kept by n poses at rest."""
+    """Distances of n poses at rest from limits."""
 
     # (n,) [m]: by how much everything that moves may move before a limit is exceeded; negative where one is.
     slack: np.ndarray

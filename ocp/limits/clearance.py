@@ -31,7 +31,7 @@ def between_cables(p: Point, p_end: Point, q: Point, q_end: Point) -> Any:
     """
     along, across, between = p_end - p, q_end - q, p - q
     f, b, c = ca.dot(across, between), ca.dot(along, across), ca.dot(along, between)
-    # Of a segment without length, such as the way of a platform at rest, any point will do.
+    # On a segment without length, such as the way of a platform at rest, any point will do.
     points = [ca.sumsqr(each) < _SHORT for each in (along, across)]
     a, e = (ca.if_else(point, 1.0, ca.sumsqr(each)) for point, each in zip(points, (along, across), strict=True))
     # On parallel lines every s will do; what is added to the denominator picks one.

@@ -130,7 +130,7 @@ def _deepest(body: Polyhedron, p: Any, p_end: Any) -> Any:
     for share, falling in ((low, True), (high, False)):
         plane = _chosen(_planes(body), highest(share, falling)[1])
         lines.append(_Line(ca.dot(plane[:3], p) - plane[3], ca.dot(plane[:3], p_end - p)))
-    # Of a segment along a face all that is in a span is as deep: a rounded number has no derivative.
+    # All points of a segment along a face are as deep within a span: a rounded number has no derivative.
     left, right = lines
     share = _crossing(0.0, 1.0, left, right, ca.floor(high / _FINE) * _FINE)
     return ca.fmax(*(line.start + share * line.slope for line in lines))

@@ -16,7 +16,7 @@ from typing_extensions import override
 
 from .state import State
 
-# Of the scale: what the audit accepts beyond a bound. Of an angle it is 1e-6 rad: programs bound the cosine, which
+# Share of the scale that the audit accepts beyond a bound. For angles it is 1e-6 rad: programs bound the cosine, which
 # resolves a small angle to no better than this.
 TOLERANCE = 1e-6
 EQUATION_TOLERANCE = 1e-3  # of the scale: equations hold at the nodes, and between them nearly

@@ -31,7 +31,7 @@ class Row(NamedTuple):
 
 
 class Tightening(NamedTuple):
-    """By how much the bounds of a limit's rows move inwards, and when the task fixes what it bounds."""
+    """Shifts by which the bounds of a limit's rows move inwards, and when the task fixes what it bounds."""
 
     lower: float = 0.0
     upper: float = 0.0

@@ -29,8 +29,8 @@ PATIENCE = 10  # iterations without a better one
 ROUND, CLOSE = 24, 1e-4  # iterates in a circle, and what constraints miss there at most
 GAIN = 1e-4  # of the objective: what an iterate must be better by not to be in a circle
 MOST_ITERATIONS = 400
-# Of the pivot tolerances of MUMPS the larger one refactorises less where thrust directions are equations: teams of
-# quadrotors then take half of the time. Of other robots each iteration takes 10 % longer. Ordered by METIS, an
+# MUMPS refactorises less with a larger pivot tolerance where thrust directions are equations: teams of
+# quadrotors then take half of the time. For other robots each iteration takes 10 % longer. Ordered by METIS, an
 # iteration of a team past obstacles takes less than half of the time that it takes with MUMPS's own choice. Without a
 # permutation that scales it would take another tenth less, but short motions of teams are then not found.
 TEAM = {"mumps_pivtol": 1e-4, "mumps_pivot_order": 5}
@@ -80,10 +80,10 @@ _STARTS: dict[str, dict[str, Any]] = {
     # N = 100 to 1600, and 6 to 40 from the barrier above.
     "coarser": {"mu_init": 1e-5},
     "solution": FROM_A_SOLUTION,
-    # Of a program whose bounds have moved: as near to the old ones it cannot move with them. Each step ended at the
+    # For a program whose bounds have moved: as near to the old ones it cannot move with them. Each step ended at the
     # bounds of its slacks, so that a forest of six quadrotors took 84 iterations, of which it now takes 28.
     "tightened": _from_a_solution(1e-3),
-    # Of a program whose parameters have changed a little: with the accuracy of others each would take two iterations
+    # For a program whose parameters have changed a little: with the accuracy of others each would take two iterations
     # more, and the motions differ by less than the audit can tell. What constraints may miss is the same.
     "near": FROM_A_SOLUTION | {"mu_init": 1e-7, "tol": 1e-6},
 }
@@ -298,7 +298,7 @@ class _Watch(ca.Callback):
     def eval_buffer(self, arg: Sequence[memoryview], res: Sequence[memoryview]) -> int:
         x, f, g, lam_x, lam_g = (np.frombuffer(arg[i]) for i in range(5))
         objective = float(f[0])
-        # What making up for what g misses would change, to first order.
+        # Change that would make up for what g misses, to first order.
         missed = g - np.minimum(np.maximum(g, self.program.lower_g), self.program.upper_g)
         infeasibility = float(np.abs(missed).max(initial=0.0))
         if infeasibility <= MET:

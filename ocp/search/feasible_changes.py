@@ -52,13 +52,13 @@ def _shifted(scenario: Scenario) -> Change | None:
     return shifted_path(scenario, shortest_shift(scenario))
 
 
-# Of a motion exactly on its path each is tried, since this takes little time; of others each solves programs.
+# For a motion exactly on its path each is tried, since this takes little time; for others each solves programs.
 OF_PATHS = (
     *(nearer_end, smaller_circle, other_yaws, less_wind, lighter_load, surer_load, lighter_platform),
     *(larger_t_max, smaller_t_min, _shifted),
 )
 BY_PROGRAMS = less_wind, lighter_load, lighter_platform, nearer_end
-# Of changes together the first are left out first. Stronger cables permit what a lighter platform does, at any t_min.
+# When tried together, the first are left out first. Stronger cables permit what a lighter platform does, at any t_min.
 OF_CABLES = smaller_t_min, larger_t_max
 OTHERS = lighter_load, less_wind, nearer_end, less_margin, slower_rate, longer
 

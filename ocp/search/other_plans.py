@@ -16,7 +16,7 @@ from .refinement import refine
 from .search import Search
 
 DIGITS = 4  # of what is offered: reports print no more
-# Of all programs of offers, as iterations times free coordinates at their nodes: as much as the plan took, within
+# Effort of all programs of offers, as iterations times free coordinates at their nodes: what the plan took, within
 # these bounds, of a few seconds.
 LEAST_EFFORT, MOST_EFFORT = 8e4, 1.2e5
 PART = 0.6  # of the remaining effort, for one program

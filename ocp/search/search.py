@@ -156,7 +156,7 @@ class Search:
             if self.seconds_left <= 0:
                 stage.message = f"{ENDS[TIME_LIMIT]} before it began"
                 return self._unsolved(mesh, guess)
-            # Of few regions rows that are not needed cost less than another round.
+            # With few regions, rows that are not needed cost less than another round.
             crowded = len(self.scenario.task.limits.keep_out) > FEW
             reach = NEAR if coarser or (clear and crowded) else 2 * NEAR
             outcome = self._run(mesh, guess, coarser, reach)

@@ -255,7 +255,7 @@ class Field(Displayed):
                 description, part = type(part).model_fields[step].description or "", getattr(part, step)
         found = _UNIT.search(description)
         units = found[1].split(", ") if found else [""]
-        # Of a pose: lengths, then angles.
+        # The units of a pose: lengths, then angles.
         return units[step >= 3] if len(units) == 2 and isinstance(step, int) else ", ".join(units)
 
 

@@ -294,7 +294,7 @@ def _refuse(s: np.ndarray, bad: np.ndarray, must: str, got: str) -> None:
 def relative(limits: Limits, platform: Motion, carriers: Motion) -> np.ndarray:
     """Return the sizes of all values along a motion, by s or by time, in parts of their bounds, (n, k)."""
     values = limits.along(platform, carriers)
-    # Of a motion by s there are no times; no limit that a time law keeps is one of a rate.
+    # A motion by s has no times; no limit that a time law keeps is a limit of a rate.
     sizes = (
         np.abs(limit.over(np.arange(len(platform.pose)), its)) / limit.high
         for limit, its in zip(limits, values, strict=True)

@@ -132,7 +132,7 @@ class Proof(Displayed):
 
     s: float  # the place
     problem: TensionProblem  # the tension problem of the speed and acceleration that come nearest
-    # Of the problem. Along its direction every other allowed speed and acceleration misses at least as much.
+    # Along its direction every other allowed speed and acceleration misses at least as much.
     certificate: Certificate
 
 

@@ -166,7 +166,7 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
             audited = replace(audited, excess=beyond, certificate=None)
             return Plan(scenario, MotionStatus.INFEASIBLE, None, audited, 0.0, 0.0, law=law)
         missing = _missing(law, audited)
-        # What motors lack, a reserve makes up for, as for missing wrenches.
+        # A reserve makes up for what motors lack, as for missing wrenches.
         known = (each for each in audited.excess if each.limit in KNOWN_LIMITS and each.limit != WinchForce.name)
         excess = max([0.0, *(each.value / each.bound - 1.0 for each in known)])
         if attempts == ATTEMPTS:

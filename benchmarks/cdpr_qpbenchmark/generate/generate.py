@@ -23,7 +23,7 @@ from towline.statics.distribution import pose_problem, wrench_problem
 DATA = Path(__file__).resolve().parent.parent / "data"
 
 REDUNDANT = ["acrobot", "caroca", "cogiro", "example-spatial", "ipanema-1", "ipanema-2", "the-cable-robot-simulator"]
-STIFFNESS = 1e3  # What a missing wrench costs in the soft problems, relative to the same tension.
+STIFFNESS = 1e3  # Cost of a missing wrench in the soft problems, relative to the same tension.
 STEP = 1e-3  # [s] of the trajectories
 
 

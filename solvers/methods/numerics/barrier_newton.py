@@ -63,7 +63,7 @@ def barrier_point(form: StandardForm, square: float, mu: float, start: Array | N
         used += more
         if point is not None:
             return Proposal(point, used)
-    # As far inside the limits as a linear program finds a point; of wide ranges, a unit of s is space enough.
+    # As far inside the limits as a linear program finds a point; in wide ranges, one unit of s is enough.
     inner, share = deepest(form, np.minimum(form.upper - form.lower, 1.0), most=0.5)
     if inner.s is None or share <= 1e-9:
         return Proposal(None, used, "the feasible tensions have no interior")
@@ -81,7 +81,7 @@ def _pulled_inside(form: StandardForm, start: Array | None) -> Array:
         both = np.isfinite(lower) & np.isfinite(upper)
         middle = 0.5 * np.where(both, lower, 0.0) + 0.5 * np.where(both, upper, 0.0)
         start = np.where(both, middle, np.minimum(np.maximum(lower + 0.5, 0.0), upper - 0.5))
-        # Of a range much wider than the load, the middle is far from everything.
+        # In a range much wider than the load, the middle is far from everything.
         start = np.minimum(np.maximum(start, -2.0 + np.maximum(lower, 0.0)), 2.0 + np.maximum(lower, 0.0))
     return np.minimum(np.maximum(start, lower + 1e-3 * space), upper - 1e-3 * space)
 
