@@ -314,3 +314,21 @@ def test_robots_that_cannot_be_so_far_apart_have_a_distance_at_which_they_hold_t
     nearest = min(np.linalg.norm(anchors[i] - anchors[j]) for i in range(3) for j in range(i))
     assert 0.7 * nearest < offer.possible < 8.4
     assert plan(robot, task | {"limits": {"carrier_separation": offer.possible}}).feasible
+
+
+@pytest.mark.parametrize("kind", ["waypoints", "samples"])
+def test_points_with_times_are_passed_later(kind):
+    """Accelerations fall with the square of the times."""
+    times = np.linspace(0, 1.2, 7)
+    share = times / 1.2
+    share = share**3 * (10 - 15 * share + 6 * share**2)
+    poses = np.column_stack([0.5 * share, 0.3 * share, 1 + 0.2 * share]).tolist()
+    path = {"kind": kind, "poses": poses} if kind == "samples" else {"kind": kind, "points": poses, "shape": "spline"}
+    task = {"path": path | {"times": times.tolist()}, "limits": {"platform_acceleration": 0.4}}
+    planned = plan("ipanema-1", task)
+    (excess,) = planned.audit.excess
+    later = {relaxed.name: relaxed for relaxed in planned.relaxations}["path.times"]
+    assert later.requested == 1.2
+    assert later.possible == pytest.approx(1.2 * np.sqrt(excess.value / 0.4), rel=5e-3)
+    assert plan("ipanema-1", later.plan.scenario.task).feasible
+    assert later.plan.scenario.task.path.times == pytest.approx(later.possible / 1.2 * times)

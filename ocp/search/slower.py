@@ -13,7 +13,7 @@ from ..proofs.durations import Durations
 from ..proofs.infeasible_ends import infeasible_ends
 from ..result import Relaxed
 from ..tasks.lay_out import with_task
-from ..tasks.paths import CirclePath, FeedPath, RestPath, SequencePath
+from ..tasks.paths import CirclePath, FeedPath, RestPath, SamplePath, SequencePath, WaypointPath
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
 from .largest_share import ORDERS, Change, Variation, along, at_ease, largest_share
@@ -159,8 +159,10 @@ def longer(scenario: Scenario, times: np.ndarray | None = None) -> Change | None
 
 
 def slower_rate(scenario: Scenario) -> Change | None:
-    """Return the change of the feed or angular velocity of a path that has its own to a smaller one."""
+    """Return the change of the feed, angular velocity or times of a path that has its own to a slower one."""
     path = scenario.task.path
+    if isinstance(path, WaypointPath | SamplePath):
+        return _later(scenario, path)
     if not isinstance(path, FeedPath | CirclePath):
         return None
     fed = isinstance(path, FeedPath)
@@ -179,6 +181,21 @@ def slower_rate(scenario: Scenario) -> Change | None:
 
     name, unit = ("path.feed", "m/s") if fed else ("path.rate", "rad/s")
     return Change(name, unit, at, up=fastest < 0)
+
+
+def _later(scenario: Scenario, path: WaypointPath | SamplePath) -> Change | None:
+    """Return the change of the times at which a path passes its points to later ones, all by one factor."""
+    given = path.times
+    if given is None or scenario.task.duration is not None:
+        return None
+
+    def at(share: float) -> Variation:
+        last = rounded(given[-1] / max(share, given[-1] / scenario.longest), up=True)
+        times = tuple((last / given[-1] * np.array(given)).tolist())
+        detail = f"for the last point instead of {quantity(given[-1], 's')}, the others by the same factor"
+        return along(scenario, path.model_copy(update={"times": times})), last, detail
+
+    return Change("path.times", "s", at, up=True, requested=given[-1])
 
 
 def slower_states(search: Search, scenario: Scenario) -> list[Relaxed]:
