@@ -331,4 +331,4 @@ def test_points_with_times_are_passed_later(kind):
     assert later.requested == 1.2
     assert later.possible == pytest.approx(1.2 * np.sqrt(excess.value / 0.4), rel=5e-3)
     assert plan("ipanema-1", later.plan.scenario.task).feasible
-    assert later.plan.scenario.task.path.times == pytest.approx(later.possible / 1.2 * times)
+    assert later.plan.scenario.task.path.times == pytest.approx(later.possible / 1.2 * times, rel=1e-3)

@@ -160,42 +160,29 @@ def longer(scenario: Scenario, times: np.ndarray | None = None) -> Change | None
 
 def slower_rate(scenario: Scenario) -> Change | None:
     """Return the change of the feed, angular velocity or times of a path that has its own to a slower one."""
-    path = scenario.task.path
-    if isinstance(path, WaypointPath | SamplePath):
-        return _later(scenario, path)
-    if not isinstance(path, FeedPath | CirclePath):
+    path, order = scenario.task.path, 1
+    if isinstance(path, CirclePath):
+        name, unit, given, details = "rate", "rad/s", path.rate, []
+    elif isinstance(path, FeedPath):
+        name, unit, given = "feed", "m/s", path.feed or max(path.feeds or (0.0,))
+        details = ["the others by the same factor"] if path.feed is None else []
+    elif isinstance(path, WaypointPath | SamplePath) and path.times is not None and scenario.task.duration is None:
+        name, unit, given, order = "times", "s", path.times[-1], -1
+        details = [f"for the last point instead of {quantity(given, 's')}", "the others by the same factor"]
+    else:
         return None
-    fed = isinstance(path, FeedPath)
-    fastest = path.rate if isinstance(path, CirclePath) else path.feed or max(path.feeds or (0.0,))
-    others = ", the others by the same factor" if fed and path.feed is None else ""
     least = scenario.duration / scenario.longest  # else it would last too long to be audited
 
     def at(share: float) -> Variation:
         share = max(share, least)
         data = path.model_dump()  # a copy of the path would keep its law
-        for name, power in (("rate", 1), ("drift", 1), ("feed", 1), ("feeds", 1), ("acceleration", 2)):
-            if data.get(name) is not None:
-                data[name] = (share**power * np.array(data[name])).tolist()
-        push = f"{others}, with an acceleration of {quantity(data['acceleration'], 'm/s^2')}" if fed else ""
-        return along(scenario, type(path).model_validate(data)), share * fastest, push.removeprefix(", ")
+        for key, power in (("rate", 1), ("drift", 1), ("feed", 1), ("feeds", 1), ("acceleration", 2), ("times", -1)):
+            if data.get(key) is not None:
+                data[key] = (share**power * np.array(data[key])).tolist()
+        push = [f"with an acceleration of {quantity(data['acceleration'], 'm/s^2')}"] if name == "feed" else []
+        return along(scenario, type(path).model_validate(data)), share**order * given, ", ".join(details + push)
 
-    name, unit = ("path.feed", "m/s") if fed else ("path.rate", "rad/s")
-    return Change(name, unit, at, up=fastest < 0)
-
-
-def _later(scenario: Scenario, path: WaypointPath | SamplePath) -> Change | None:
-    """Return the change of the times at which a path passes its points to later ones, all by one factor."""
-    given = path.times
-    if given is None or scenario.task.duration is not None:
-        return None
-
-    def at(share: float) -> Variation:
-        last = rounded(given[-1] / max(share, given[-1] / scenario.longest), up=True)
-        times = tuple((last / given[-1] * np.array(given)).tolist())
-        detail = f"for the last point instead of {quantity(given[-1], 's')}, the others by the same factor"
-        return along(scenario, path.model_copy(update={"times": times})), last, detail
-
-    return Change("path.times", "s", at, up=True, requested=given[-1])
+    return Change(f"path.{name}", unit, at, up=order * given < 0)
 
 
 def slower_states(search: Search, scenario: Scenario) -> list[Relaxed]:
