@@ -127,6 +127,8 @@ def test_a_thousand_random_steps_are_those_of_the_plant(name, drive, unit):
     assert steps_in(STEP, plant) == 1
     pulls = references_at(robot, read_trajectory(robot, robot.home, None), np.zeros(1))[0].tensions
     fixed, inputs, m = robot.fixed_lengths, one.names("input"), robot.m
+    dampings = {each.unit for name, each in one.variables.items() if name.endswith("].damping")}
+    assert dampings == ({"N.s/m"} if drive else set())  # a force when multiplied by a velocity
     state = plant.start(tensions=pulls if fixed is None else None, lengths=fixed)
     outputs = motion("platform", "pose", "velocity") + each("cable[{}].length", m) + each("cable[{}].rate", m)
     at_start = np.array([float(one.variables[name].start) for name in inputs])

@@ -114,7 +114,7 @@ def variables_of(robot: Robot, part: str, winches: str | None, data: Mapping[str
     cable = data["robot"]["cable"][: robot.m]
     if simulates and data["plant"]["drive"] != layout.TENSIONS and cable["stiffness"].all():
         for i, name in ((i, name) for i in range(robot.m) for name in ("stiffness", "damping")):
-            start, unit = float(cable[name][i]), "N" if name == "stiffness" else "N.s"
+            start, unit = float(cable[name][i]), "N" if name == "stiffness" else "N.s/m"
             place = f"robot.cable[{i}].{name}"
             rows.append(Variable(f"plant.cable[{i + 1}].{name}", "parameter", unit, place, start, name, 0.0))
     return rows
