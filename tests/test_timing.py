@@ -193,6 +193,18 @@ def test_a_limit_of_power_gives_the_minimum_time_of_one_vertical_cable(power):
     }
 
 
+def test_a_cable_that_rests_for_an_instant_needs_no_power():
+    """Passing below an anchor, its length has no rate; there and back in time the law is the same."""
+    robot = point_mass([[-2, 0, 2], [0, 0, 2], [2, 0, 2]], ["x", "z"])
+    path = LinePath(kind="line", start=(-0.5, 0, 0), end=(0.5, 0, 0))
+    with np.errstate(over="raise"):
+        fastest = time_along(robot, along(path, limits={"winch_power": 5.0}))
+    assert fastest.feasible
+    assert fastest.duration > 1.3 * time_along(robot, along(path)).duration
+    sd = fastest.law.sd
+    np.testing.assert_allclose(sd, sd[::-1], atol=0.02 * sd.max())
+
+
 @pytest.mark.parametrize(("inertia", "force"), [(3.0, 40.0), (300.0, 40.0), (2e4, 40.0), (3.0, 1.0)])
 def test_of_two_cables_the_one_without_a_motor_pulls_what_a_motor_cannot(inertia, force):
     """A motor that accelerates its winch, and a cable beside it that takes the remainder of the load.

@@ -67,7 +67,8 @@ def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: floa
     if np.isfinite(force).any():
         P, Q = parametrised.reflected(*curves)
         force = force + P * sdd[:, None] + Q * np.square(sd)[:, None]
-    power = parametrised.pull_per_speed(*curves, limits.power) / np.maximum(sd, np.finfo(float).tiny)[:, None]
+    with np.errstate(divide="ignore"):
+        power = parametrised.pull_per_speed(*curves, limits.power) / sd[:, None]
     largest = np.stack(np.broadcast_arrays(high, force, power))  # (3, n, m)
     reached_limits = []
     for k in range(s.size):

@@ -36,6 +36,7 @@ SHARE_OF_BEND = 0.5  # of all intervals, that each bend has: there the limits of
 MOST_IN_BENDS = 6400  # in all together, if that is more than FEWEST in each
 FEWEST = 16  # intervals in a bend, or between two bends, of a path with hundreds of them
 CLOSE = 1e-9  # of s
+LEAST_RATE = 1e-12  # [m] per s, of a cable's length: with less it needs no power
 LOOKS = 2001  # points at which the geometry is checked
 HALVES = 40  # of the s between two of them
 FINE = 10  # times as many points at which the bound of a zone is computed
@@ -220,7 +221,7 @@ class ParametrisedPath:
         if power == np.inf:
             return np.full((len(platform.pose), self.robot.m), np.inf)
         (rates,) = Limits(self.robot, (CableSpeed(self.robot, 1.0),)).along(platform, carriers)
-        return power / np.maximum(np.abs(rates), np.finfo(float).tiny)
+        return power / np.maximum(np.abs(rates), LEAST_RATE)
 
     def _frame(self) -> bool:
         only = self.robot.carriers[0].name if len(self.robot.carriers) == 1 else None
