@@ -17,7 +17,9 @@ that are held for a period (Jury), each alone. Together they keep
 
     h (lag / 2 + (delay / 0.647 + period) / 1.5) <= 0.5        h >= 6 k
 
-with the bandwidth k of the loops of position around them, which by Routh need h > 2 k without any delay.
+with the bandwidth k of the loops of position around them, which by Routh need h > 2 k without any delay. Drives whose
+commands lead by a known lag have all of this lag while the commands are at their limits, where a loop with h lag > 2
+oscillates for good. So with all of the lag the bound is 1 in place of 0.5, unless h would be below 15 rad/s.
 """
 
 from collections.abc import Mapping
@@ -46,6 +48,7 @@ LEAST = 0.1  # of the usual bandwidths: with less a robot does not follow
 READINGS = 1e3  # [1/s], without a rate
 GRAVITY, TINY = 9.81, 1e-12  # [m/s^2]; what divides
 ATTITUDE = 40.0  # [rad/s]
+USUALLY, AT_LIMITS = 0.5, 1.0  # bounds of h times lateness; where commands at their limits cannot lead
 SLOWEST = 15.0  # [rad/s], of attitude loops: teams were lost below
 PLACE, CASCADE = 5.0, 6.0  # bandwidth of position [rad/s], and of attitude over it at least
 
@@ -102,9 +105,8 @@ def bandwidths_for(
     K = None if observer is None else number("observer", observer, 0.0, 1e3)
     h = None if attitude is None else number("attitude", attitude, 0.1, 1e3)
     errors = None if sensors is None else _errors_of(noise_of(sensors), robot)
-    lag = min(rotor_lag, ROTORS_KEEP)
     if errors is None:
-        h = _attitude_for(robot, None, lag, h)
+        h = _attitude_for(robot, None, rotor_lag, h)
         return Bandwidths(np.full(6, usual.bandwidth) if w is None else w, usual.observer if K is None else K, h)
     part, reason = errors.permit(usual.bandwidth, usual.observer)
     if w is None and K is None and part < LEAST:
@@ -122,13 +124,14 @@ def bandwidths_for(
         )
     lead = max(errors.permit_noise(float(given[0].max()), given[1], errors.calm), 1.0)
     remains = 1.0 / max(float(given[0].max()) + given[1], TINY) - errors.late + WINCHES_KEEP
-    return Bandwidths(*given, _attitude_for(robot, errors, lag, h), lead, remains)
+    return Bandwidths(*given, _attitude_for(robot, errors, rotor_lag, h), lead, remains)
 
 
 def _attitude_for(robot: Robot, errors: "_Errors | None", lag: float, given: float | None) -> float:
     """Return the bandwidth of attitude loops, `given` or the largest that lags of rotors and sensors permit."""
     delay, period = (0.0, 0.0) if errors is None else (errors.age - errors.period / 2, errors.period)
-    late, weight = lag + delay + period / 2, lag / 2 + (delay / DELAY + period / PERIOD) / UNSTABLE
+    left, by_sensors = min(lag, ROTORS_KEEP), (delay / DELAY + period / PERIOD) / UNSTABLE
+    late, weight = left + delay + period / 2, left / 2 + by_sensors
     if not late or not any(carrier.actuators for carrier in robot.carriers):
         return given or ATTITUDE
     if given is not None and given * weight * UNSTABLE > 1.0:
@@ -136,7 +139,7 @@ def _attitude_for(robot: Robot, errors: "_Errors | None", lag: float, given: flo
             f"attitude must be at most {1 / UNSTABLE / weight:.3g} rad/s if carriers turn {quantity(late, 's')} late, "
             f"got {given:g} rad/s"
         )
-    most = min(ATTITUDE, 0.5 / weight)
+    most = min(ATTITUDE, USUALLY / weight, max(AT_LIMITS / (lag / 2 + by_sensors), SLOWEST))
     if given is None and most < SLOWEST:
         raise InputError(
             f"sensors must permit attitude loops of {SLOWEST:g} rad/s, got carriers that turn {quantity(late, 's')} "

@@ -1,6 +1,7 @@
 """Default bandwidths by what sensors permit: against a loop of plain NumPy with delay and noise."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -131,6 +132,35 @@ def test_attitude_loops_with_the_permitted_bandwidth_are_stable_and_refused_ones
         assert turns_more_and_more(2.5 * h, *late)
         with pytest.raises(InputError, match="attitude must be at most"):
             bandwidths_for(robot, TEAM, sensors, late[0], attitude=2.5 * h)
+
+
+def keeps_turning(h, lag, most, rate, dt=1e-3):
+    """Return how far a carrier turns in the last of 3 s [rad], from a rate [rad/s] on, by limited accelerations.
+
+    Commands lead so that 15 ms of the lag remain, inside the limits. The law is that of core/control/thrusts.c.
+    """
+    angle, given, known, far = 0.0, 0.0, 0.0, np.zeros(3000)
+    share, linear = 1 - np.exp(-dt / lag), 2 * most / h**2
+    for k in range(3000):
+        far_off = abs(angle) > linear
+        back = math.sqrt(most * (abs(angle) - linear / 2)) if far_off else h / 2 * abs(angle)
+        wanted = 2 * h * (-math.copysign(back, angle) - rate)
+        wanted = min(max(wanted, -most), most)
+        sent = min(max(known + lag / 0.015 * (wanted - known), -most), most)
+        known += share * (sent - known)
+        given += share * (sent - given)
+        rate, angle = rate + dt * given, angle + dt * rate
+        far[k] = abs(angle)
+    return far[2000:].max()
+
+
+@pytest.mark.parametrize("lag", [0.08, 0.1])
+def test_carriers_with_a_known_lag_stop_after_large_turns_too(lag):
+    """Torques of a library's quadrotor, 150 rad/s^2, at whose limits commands cannot lead."""
+    h = bandwidths_for(load("multi-quadrotor-3"), TEAM, None, lag).attitude
+    assert h == pytest.approx(2 / lag)
+    assert max(keeps_turning(h, lag, 150.0, rate) for rate in (1.0, 6.0)) < 1e-3
+    assert max(keeps_turning(40.0, lag, 150.0, rate) for rate in (1.0, 6.0)) > 0.5
 
 
 def test_attitude_loops_are_as_fast_as_rotors_and_sensors_permit():

@@ -306,7 +306,7 @@ def test_a_known_lag_of_rotors_is_made_up_for(load_on_three, told, kind, most):
     controller = kind(task.robot, rotor_lag=told)
     assert fly(task, controller, **TEAMS["rotor lag 60 ms"]).rms < most
     assert getattr(controller, "handed_over", None) is None
-    assert controller._platform["attitude"][0] == 40
+    assert controller._platform["attitude"][0] == controller._attitude == 2 / told
 
 
 @pytest.mark.parametrize("told", [0.014, 0.026])
