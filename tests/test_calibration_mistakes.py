@@ -281,7 +281,7 @@ def test_standard_deviations_include_the_error_of_a_frame_that_was_found():
         result = calibrate("cogiro", fixed)
         assert len(texts) == 1
         assert result.free == ("anchors", "offsets", "frame")
-        assert "include its error" in result.report()
+        assert "include this error" in result.report()
         true = dict(zip(result.identifiable[:3], built.robot.anchors[0], strict=False))
         z += [(one.value - true[one.name]) / one.sigma for one in result.parameters if one.name in true]
     assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.6  # 9 numbers, nearly three of them independent

@@ -1,6 +1,7 @@
 """What a calibration refuses to write: slips of a log, values that predict worse than the file; and clock offsets."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from towline.base.errors import InputError
 from towline.estimation.calibration import Measurements, calibrate, explanations
 from towline.estimation.calibration.plausibility import mistake
-from towline.models import Dynamics, load, points
+from towline.models import Dynamics, Robot, load, points
 
 from .robots_as_built import as_built, moved_anchors, random_poses
 from .warm import towline
@@ -236,3 +237,38 @@ def test_a_fit_that_leaves_out_much_is_refused(share, refused):
         assert "% of the readings do not fit the others" in said
     else:
         assert said is None
+
+
+def a_log_about_two_places(seed, wave=0.0):
+    """Robot, log, and the true anchors and offsets (16,); the file's anchors have errors of 20 mm.
+
+    About two places only, offsets look like anchors. `wave` [m] is the size of errors that repeat with the pose.
+    """
+    data, draw = load("point-mass-3").model_dump(mode="json"), np.random.default_rng(seed)
+    corners = [[3, 2, 3], [-3, 2, 3.2], [-3, -2, 3], [3, -2, 2.8]]
+    data["cables"] = [{**data["cables"][0], "anchor": corner} for corner in corners]
+    robot, anchors = Robot.model_validate(data), corners + draw.normal(0, 0.02, (4, 3))
+    offsets, middles = draw.normal(0, 0.3, 4), draw.uniform(-0.5, 0.5, (2, 1, 3))
+    moved = (middles + draw.normal(0, 0.02, (2, 80, 3))).reshape(-1, 3)
+    poses = np.hstack([robot.home[:3] + moved, np.tile(robot.home[3:], (160, 1))])
+    lengths = np.linalg.norm(poses[:, None, :3] - anchors, axis=2) + draw.normal(0, 1e-3, (160, 4))
+    lengths += wave * np.sin(60 * moved @ [[1, 0, 0.3, 0.5], [0, 1, 0.5, 0.2], [0.2, 0.4, 1, 0.6]])
+    return robot, Measurements(lengths - offsets, poses, sigma=1e-3), np.hstack([anchors, offsets[:, None]]).ravel()
+
+
+def test_what_a_log_does_not_tell_is_as_uncertain_as_the_file():
+    """The file's values were kept along these directions, without any variance: anchors were 0.24 m off."""
+    squares = []
+    for seed in range(6):
+        robot, log, truth = a_log_about_two_places(seed)
+        found = calibrate(robot, log, ("anchors", "offsets"))
+        error = np.array([one.value for one in found.parameters]) - truth
+        squares.append(error @ np.linalg.solve(found.covariance, error))
+        assert np.abs(error).max() < 0.08  # four standard deviations of the file's anchors
+        assert "are assumed to be wrong by" in found.report()
+    assert np.mean(squares) < 2 * len(truth)
+
+
+def test_ends_that_the_file_knows_better_are_not_written():
+    found = calibrate(*a_log_about_two_places(0, wave=8e-3)[:2], ("anchors", "offsets"))
+    assert re.search(r"anchor.. would have a standard deviation of \d+ mm, and in the file it has", found.refused)

@@ -33,8 +33,8 @@ ENOUGH = 1e-6  # of the sum of squares, of a step that a fit need not take
 MOST_STEPS = 40  # of a fit with measured poses, which is nearly linear: others do not converge
 FEWEST = 40  # samples in all; of fewer, every other sample is left out
 CHANCE = 3.0  # times the logarithm of the number of residuals, by which a parameter of forces must reduce their squares
-UNEXPLAINED = 1.25  # times the stated standard deviation, of residuals that parameters may explain
-CLEARLY = 1.25  # times smaller errors of validation samples
+UNEXPLAINED = 1.05  # times the stated standard deviation, of residuals that parameters may explain
+CLEARLY, EXPLAINED = 1.25, 0.5  # times smaller errors of validation samples, or share of the variance that repeats
 WORSE = 1.02  # of the smallest error left out that a smaller set of parameters may have
 CLEANED = {"anchors", "offsets", "clock"}  # found while wrong readings are looked for
 FORCES = ("mass", "com", "capstan", "friction", "zeros")  # of which auto selects
@@ -143,19 +143,23 @@ def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[st
 def extended(solved: Solved, free: tuple[str, ...], prior: dict[str, float]) -> tuple[str, ...]:
     """Return `free` with attachments, scales, build-up and radii as far as they explain errors that repeat.
 
-    They do if validation samples are predicted clearly better. Stretch of cables is their rival where it can be known.
+    They do if validation samples are predicted clearly better, or by half of the errors that repeat. Stretch of cables
+    is their rival where it can be known.
     """
     of = solved.model
     known = {"anchors", "offsets"} <= {*free} and not of.size_is_open and of.robot.fixed_lengths is None
     explained = solved.fit.cost < UNEXPLAINED**2 * of.weights.sum()
-    if not known or explained or is_still(of.measurements) or solved.noise.repeating is None:
+    if not known or explained or is_still(of.measurements) or (repeats := solved.noise.repeating) is None:
         return free
     sets = [tuple({*free, *one}) for one in _nested(of.robot, of.measurements)]
     if _of_stretch(solved) and not {"elasticity", "stiffness"} & {*free}:
         sets += [(*one, "elasticity") for one in sets]
     held_out = _compare(solved, [*dict.fromkeys(tuple(name for name in GROUPS if name in one) for one in sets)], prior)
     errors = {one.free: one.left_out for one in held_out.sets}
-    best = held_out.best if CLEARLY * errors[held_out.best] < errors[free] else free
+    residuals = lengths_of(of, solved.fit.state).T[of.weights]
+    part = EXPLAINED * repeats.sigma**2 * float((residuals**2).mean())
+    least = max(errors[free] / CLEARLY, np.sqrt(max(errors[free] ** 2 - part, 0.0)))
+    best = held_out.best if errors[held_out.best] < least else free
     return tuple(name for name in best if name in free or name != "elasticity")  # whose own test is stricter
 
 

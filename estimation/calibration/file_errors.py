@@ -1,11 +1,12 @@
-"""`errors_of_file`: how wrong the file's anchors or attachments turn out to be, as a prior where frames are unknown.
+"""`errors_of_file`: how wrong the file's anchors or attachments turn out to be, as a prior of what a log does not tell.
 
-Poses in an unknown frame tell the anchors only up to a rigid motion of them all. How well the file's anchors tell that
-depends on how far they are from the true ones, which the others of their changes show: with a variance s^2 of the
-file's errors, and v_k of the fit's along principal axis k, the change c_k has the variance s^2 + v_k. A log determines
-few axes, so s^2 remains uncertain. With Jeffreys' prior for s^2, errors of the rigid motion have a distribution with
-long tails (of Student, with as many degrees of freedom as axes, where v_k is small). The prior is the normal
-distribution whose 95 % ellipsoid is the ellipsoid of these errors.
+Poses in an unknown frame tell the anchors only up to a rigid motion of them all, and winches that hardly move tell an
+offset only together with the anchor. How well the file's anchors tell the rest depends on how far they are from the
+true ones, which the others of their changes show: with a variance s^2 of the file's errors, and v_k of the fit's along
+principal axis k, the change c_k has the variance s^2 + v_k. A log determines few axes, so s^2 remains uncertain. With
+Jeffreys' prior for s^2, errors along the other axes have a distribution with long tails (of Student, with as many
+degrees of freedom as axes, where v_k is small). The prior is the normal distribution whose 95 % ellipsoid is the
+ellipsoid of these errors.
 """
 
 from collections.abc import Mapping
@@ -13,10 +14,14 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import chdtr, chdtri
 
+from .geometry import length_of
+from .normal_equations import metric
 from .parameters import Parameters
-from .solving import LOOSE, LOOSE_SHARE, Solved, covariance_of
+from .solving import Solved, covariance_of
 
 ENDS = {"frame": "anchors", "body": "attachments"}  # what an unknown frame moves together with
+LOOSE, LOOSE_SHARE = 0.1, 0.03  # [m] of standard deviation, and share of the cables' length: files are usually better
+NEARLY_LOOSE = 0.01  # of the variance, below which residuals are never large enough to make it so large
 DETERMINED = 0.1  # of the variance of the first prior
 
 
@@ -24,6 +29,25 @@ def loose(length: float, groups: tuple[str, ...], prior: Mapping[str, float]) ->
     """Return standard deviations with loose ones for anchors and attachments that may move with unknown frames."""
     ends = [end for frame, end in ENDS.items() if frame in groups and end in groups and end not in prior]
     return dict(prior) | dict.fromkeys(ends, min(LOOSE, LOOSE_SHARE * length))
+
+
+def undetermined(solved: Solved) -> dict[str, float]:
+    """Return loose standard deviations for the ends of cables if a fit without a prior knows ends or offsets worse.
+
+    If poses are estimated, too, this is so only if the fit went farther than that from the file.
+    """
+    of, scale = solved.model.parameters, metric(solved.model)
+    lengths = np.flatnonzero(np.array(of.units)[of.varies] == "m")
+    lengths = lengths[np.flatnonzero(of.varies)[lengths] < of.clock]
+    block, length = np.ix_(lengths, lengths), length_of(of.robot)
+    limit, seen = min(LOOSE, LOOSE_SHARE * length) ** 2, solved.observability.covariance
+    if solved.model.prior or not lengths.size or np.linalg.eigvalsh(seen[block])[-1] < NEARLY_LOOSE * limit:
+        return {}
+    values, vectors = np.linalg.eigh(solved.noise.covariance[block])
+    away = ((solved.fit.state.x - of.first) * scale)[of.varies][lengths] @ vectors
+    if values[-1] <= limit or (solved.model.size_is_open and (away[values > limit] ** 2).sum() <= limit):
+        return {}
+    return dict.fromkeys([end for end in ENDS.values() if end in of.groups], LOOSE_SHARE * length)
 
 
 def errors_of_file(solved: Solved, prior: Mapping[str, float]) -> dict[str, float]:

@@ -132,13 +132,16 @@ def _of_noise(result: CalibrationData) -> list[str]:
     timeless = hangs(result.file, result.measurements) and result.measurements.times is None
     if timeless and forces is not None and not forces.motion_is_known:
         lines.append("the poses look like a motion without times, so stretch of the cables was not sought")
-    for frame, end in ((one, ENDS[one]) for one in ENDS if one in result.free):
+    for frame, end in ENDS.items():
         size = f"wrong by {_mm(result.prior[end])}" if end in result.prior else "exact"
         what = "the frame of the poses" if frame == "frame" else "the measured body"
-        lines.append(
-            f"{what} was found from the file's {end}, which are assumed to be {size}: the standard deviations below "
-            "include its error"
-        )
+        if frame in result.free:
+            found = f"{what} was found from the file's {end}, which are assumed to be {size}"
+        elif end in result.prior:
+            found = f"where the log hardly tells how {end} differ from the file's, these are assumed to be {size}"
+        else:
+            continue
+        lines.append(f"{found}: the standard deviations below include this error")
     kept = [name for name in ("anchors", "offsets") if name not in result.free]
     still, uncertainty = len(kept) == 1 and is_still(result.measurements), result.file.uncertainty
     known = "frame" in result.free or (uncertainty and any(".anchor." in name for name in uncertainty.parameters))

@@ -19,6 +19,7 @@ from ..logs.measurements import Measurements
 from .clock import is_still
 from .cross_validation import WORSE, HeldOut, compare, poses_fitted
 from .differences import PLAUSIBLE
+from .file_errors import ENDS
 from .geometry import length_of
 from .load_changes import load_changes
 from .outliers import Outlier, Slip
@@ -30,6 +31,7 @@ from .solving import Noise, Solved, covariance_of, inflation_of, lengths_of
 EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
 FAR = 5.0  # standard deviations of the prior
 FARTHEST = 0.5  # of the cables' length, by which an anchor or an attachment may be displaced
+MOST_LOST = 2.0  # times the standard deviation of the file, beyond which a calibrated end is worse than the file's
 MOST_WRONG = 1 / 3  # of the readings, beyond which a fit to the others means nothing
 
 
@@ -91,9 +93,9 @@ class CalibrationData(Displayed):
         """Return why `save` and `towline calibrate` do not write the robot, in one line; None if they do.
 
         The log probably has an input error, the fit did not converge, an end of a cable or the CoM would move by more
-        than half of the cables' length (3 % if winches are locked), the anchors of a robot without measured positions
-        would be 3 % farther apart or closer, residuals exceed 3 % of the cables' length, a third of the readings are
-        outliers, the mass changes, or validation samples fit worse than with the file's robot.
+        than half of the cables' length (3 % if winches are locked) or be known worse than in the file, the anchors of a
+        robot without measured positions would be 3 % farther apart or closer, residuals exceed 3 % of the cables'
+        length, a third of the readings are outliers, the mass changes, or the file fits validation samples better.
         """
         if self.doubt is not None:
             return self.doubt
@@ -128,15 +130,21 @@ class CalibrationData(Displayed):
 
     @cached_property
     def undetermined(self) -> str | None:
-        """Return which end of a cable, the CoM, or all anchors would move too far to be real, in one line, or None."""
-        ends = (one for one in self.parameters if ".a" in one.name or one.name.startswith("com"))
-        far, length = max(ends, key=lambda one: abs(one.correction), default=None), length_of(self.file)
+        """Return which end or CoM would move too far to be real, or be known worse than before, in a line, or None."""
+        moved = (one for one in self.parameters if ".a" in one.name or one.name.startswith("com"))
+        far, length = max(moved, key=lambda one: abs(one.correction), default=None), length_of(self.file)
         if self.growth is not None and abs(self.growth) > PLAUSIBLE:
             return (
                 "lengths without positions do not determine the size of the robot: its anchors would be "
                 f"{apart(self.growth)}; give a prior"
             )
         still = is_still(self.measurements) and self.measurements.carrier_poses is None
+        ends = [(one, end) for one in self.parameters for end in ENDS.values() if f".{end[:-1]}." in one.name]
+        sigmas = [(one.sigma / self.prior[end], one, self.prior[end]) for one, end in ends if end in self.prior]
+        times, worst, known = max(sigmas, default=(0.0, None, 0.0))
+        if worst is not None and times > MOST_LOST:
+            after, before = (quantity(1e3 * sigma, "mm", digits=2) for sigma in (worst.sigma, known))
+            return f"{worst.name} would have a standard deviation of {after}, and in the file it has {before}"
         if far is None or abs(far.correction) <= (PLAUSIBLE if still else FARTHEST) * length:
             return None
         by, of = (quantity(size, "m", digits=3) for size in (abs(far.correction), length))

@@ -9,7 +9,7 @@ from ..logs.measurements import Measurements, check_measurements, tracked
 from .calibration import Calibration
 from .cross_validation import extended, select
 from .enough import check_enough, usual
-from .file_errors import errors_of_file, loose
+from .file_errors import errors_of_file, loose, undetermined
 from .geometry import length_of
 from .parameters import GROUPS, IN_BALANCE, check_free, check_prior
 from .plausibility import mistake
@@ -85,6 +85,9 @@ def calibrate(
                 "measurements.poses must be known throughout a motion to estimate elasticity without tensions, got "
                 f"{int(tracked(chosen, given).sum())} of {len(given)}: longer gaps and open ends hide accelerations"
             )
+    if first == priors and not (found and found.severe) and (loosely := undetermined(solved)):
+        first = priors | loosely
+        solved = solve(chosen, given, groups, first, outliers)
     if first != priors:
         priors = errors_of_file(solved, priors)
         solved = solve(chosen, given, groups, priors, outliers)

@@ -26,16 +26,12 @@ from .normal_equations import metric
 from .observability import Observability
 from .outliers import LEAST_THRESHOLD, SHORTEST, Outlier, Slip, find_outliers, find_slips, find_unbalanced, robust
 from .parameters import OF_ROBOT, Parameters
-from .pose_noise import keeping, observed
+from .pose_noise import observed
 from .projection import out_of_plane
 from .repeating_errors import Repeating, repeating
 from .sightings import sighted
-from .starts import NEAR_THE_FILE, fit_from, level_poses
+from .starts import fit_from, level_poses
 
-LOOSE, LOOSE_SHARE = 0.1, 0.03  # [m] of standard deviation, and share of the cables' length: files are usually better
-FEWEST_KNOWN, MEDIAN = 3, 0.455  # directions whose changes show the file's errors; median of chi-square with 1 degree
-ROUNDING = 1e-13  # of the largest variance: a direction without any is unobservable, or kept already
-NEARLY_LOOSE = 0.01  # of the variance, below which residuals are never large enough to make it so large
 ROUNDS = 30  # of fits, each without the wrong readings of those before
 FEW = 0.02  # of the samples
 MOST_SLIPS = 8
@@ -167,49 +163,11 @@ def solve(
         model = replace(model, weights=model.weights & ~left)
         result, fitted = fit(model, result.state, length), model.weights
     model, result = _weighed(model, result, length, True)
-    model, result, seen = _determined(model, result, length)
+    seen = observed(model, result.state, length)
     if clocks is not None:
         model, result, clocks = with_carrier_clocks(model, result, measurements, clocks, length)
         seen = clocks.widened(observed(model, result.state, length))
     return Solved(model, result, tuple(wrong.values()), tuple(slips), seen, clocks)
-
-
-def _determined(model: Model, result: Fit, length: float) -> tuple[Model, Fit, Observability]:
-    """Return the model that keeps the file's values where the log knows ends of cables and offsets worse, with its fit.
-
-    These are directions with a standard deviation beyond the limit along which the fit went farther than that, without
-    a prior, which would hold them. The limit is larger if changes along the other directions show larger errors of the
-    file, as of large robots.
-    """
-    of, scale = model.parameters, metric(model)
-    lengths = np.flatnonzero(np.array(of.units)[of.varies] == "m")
-    lengths = lengths[np.flatnonzero(of.varies)[lengths] < of.clock]
-    block, limit = np.ix_(lengths, lengths), min(LOOSE, LOOSE_SHARE * length) ** 2
-    seen = observed(model, result.state, length)
-    if model.prior or not lengths.size or np.linalg.eigvalsh(seen.covariance[block])[-1] < NEARLY_LOOSE * limit:
-        return model, result, seen
-
-    def directions(of_fit: Fit, seen: Observability) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        values, vectors = np.linalg.eigh(Solved(model, of_fit, (), (), seen).noise.covariance[block])
-        return values, vectors, ((of_fit.state.x - of.first) * scale)[of.varies][lengths] @ vectors
-
-    values, _, away = directions(result, seen)
-    if (away[values > limit] ** 2).sum() <= limit:
-        return model, result, seen  # about where the file has them
-    # A fit may have gone so far that derivatives there are not those near the file.
-    near = fit(replace(model, prior=dict.fromkeys(NEAR_THE_FILE.keys() & of.groups, limit**0.5)), result.state, length)
-    near = near._replace(cost=model.cost(near.state))
-    values, vectors, away = directions(near, observed(model, near.state, length))
-    unseen = values <= ROUNDING * values[-1]
-    known = (values <= limit) & ~unseen
-    shown = float(np.median(away[known] ** 2 - values[known])) / MEDIAN if known.sum() >= FEWEST_KNOWN else 0.0
-    # Unobservable directions are straight lines only nearby, so a fit could go far along them.
-    still = (values > max(limit, shown)) | unseen
-    kept, state = keeping(model, near.state, np.eye(len(seen.covariance))[:, lengths] @ vectors[:, still])
-    found = fit(kept, state, length)
-    before, after = (np.linalg.norm((one.state.x - of.first) * scale) for one in (result, found))
-    sound = after <= before and found.converged and not (of.table(found.state.x)[:, 8] < 0).any()
-    return (kept, found, observed(kept, found.state, length)) if sound else (model, result, seen)
 
 
 def _with_slip(model: Model, result: Fit, slip: Slip, length: float) -> tuple[Model, Fit, np.ndarray]:
