@@ -9,6 +9,7 @@ import pytest
 from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, plan
 from towline.ocp.limits import Limit
+from towline.ocp.proofs.durations import durations
 from towline.ocp.search import feasible_changes, other_plans, slower
 from towline.ocp.search.looser_limits import looser_limits
 from towline.ocp.search.search import Search
@@ -332,3 +333,14 @@ def test_points_with_times_are_passed_later(kind):
     assert later.possible == pytest.approx(1.2 * np.sqrt(excess.value / 0.4), rel=5e-3)
     assert plan("ipanema-1", later.plan.scenario.task).feasible
     assert later.plan.scenario.task.path.times == pytest.approx(later.possible / 1.2 * times, rel=1e-3)
+
+
+def test_a_duration_is_offered_though_the_instant_that_decides_lies_between_the_places_that_were_checked():
+    points = [[-1.7, 0.1, 1.9], [-1.6, 0.5, 2.6], [0.3, -0.9, 2.6]]
+    task = {"path": {"kind": "waypoints", "points": points}, "duration": 0.2}
+    robot = load("cogiro")
+    proven = durations(lay_out(robot, read_task(task))).shortest
+    assert plan(robot, task | {"duration": slower.LONGER * proven}).status is MotionStatus.INFEASIBLE
+    offered = {relaxed.name: relaxed.possible for relaxed in plan(robot, task).relaxations}["duration"]
+    assert slower.LONGER * proven < offered < 1.02 * proven
+    assert plan(robot, task | {"duration": offered}).feasible

@@ -52,8 +52,10 @@ class Durations(NamedTuple):
         return max(self.shortest * (1 - SLACK), low) <= min(self.longest * (1 + SLACK), high)
 
 
-def durations(scenario: Scenario) -> Durations | None:
-    """Return the durations that are possible at `PLACES` points of the path; None if this method does not apply.
+def durations(scenario: Scenario, shares: np.ndarray | None = None) -> Durations | None:
+    """Return the durations that are possible at points of the path; None if this method does not apply.
+
+    `shares` of the duration, (k,), are where the motion is at these points; default: `PLACES` from 0 to 1.
 
     It does not if anything but the duration is free, a path has times of its own, the drag depends on the speed
     in another way, the ground bears something, or the cables have fewer independent columns than the platform has
@@ -65,7 +67,7 @@ def durations(scenario: Scenario) -> Durations | None:
     rows = np.flatnonzero(robot.dof_mask)
     scale = robot.wrench_scale[rows]
     loads = [None, *range(scenario.phases.extremes)]
-    shares = np.linspace(0.0, 1.0, PLACES)
+    shares = np.linspace(0.0, 1.0, PLACES) if shares is None else shares
     platform, carriers = scenario.motion(shares * scenario.duration, None)
     A = dynamics.wrench_matrix(platform.pose, carriers.pose)[:, rows] * scale[:, None]
     values = np.linalg.svd(A, compute_uv=False)

@@ -9,7 +9,7 @@ from ...models.part import PositiveRange
 from ..audits.audit import Audit
 from ..audits.excess import Excess
 from ..plan import Plan
-from ..proofs.durations import Durations
+from ..proofs.durations import Durations, durations
 from ..proofs.infeasible_ends import infeasible_ends
 from ..result import Relaxed
 from ..tasks.lay_out import with_task
@@ -64,7 +64,11 @@ def other_duration(search: Search, scenario: Scenario, left: Durations | None, a
             plan = Plan(longer, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0)
             return [Relaxed("duration", "s", requested, near, plan)]
         if audit.violation.max() > audit.tolerance:
-            return []
+            between = durations(scenario, audit.times[[audit.violation.argmax()]] / near)
+            if left is None or between is None or not between.exist:
+                return []
+            left = Durations(max(left.shortest, between.shortest), min(left.longest, between.longest), between.at)
+            near = min(max(near, LONGER * left.shortest), left.longest / LONGER)
     return []
 
 
