@@ -74,6 +74,7 @@ def run_plant(
     commands: Any,
     history: Any,
     tensions: Any,
+    means: Any,
     steps: int,
     period: float,
     substeps: int,
@@ -82,5 +83,5 @@ def run_plant(
 def sense(robot: Any, states: Any, motions: Any, lengths: Any) -> None: ...
 def winch_forces(robot: Any, settings: Any, states: Any, commands: Any, period: float) -> None: ...
 def winch_lengths(
-    robot: Any, states: Any, lengths: Any, tensions: Any, last_rates: Any, commands: Any, period: float
+    robot: Any, states: Any, lengths: Any, tensions: Any, last: Any, commands: Any, period: float
 ) -> None: ...

@@ -50,12 +50,20 @@ class Periods:
         conditions = states[:, self._conditions : self._conditions + self._m]
         conditions[np.broadcast_to(which, conditions.shape) != 0] = layout.CUT
 
-    def run(self, states: np.ndarray, commands: np.ndarray, history: np.ndarray, tensions: np.ndarray) -> None:
-        """Write states and tensions at the beginning and at the end of a period.
+    def run(
+        self,
+        states: np.ndarray,
+        commands: np.ndarray,
+        history: np.ndarray,
+        tensions: np.ndarray,
+        means: np.ndarray | None = None,
+    ) -> None:
+        """Write states and tensions at the beginning and at the end of a period, and the mean tensions in it.
 
         - `states`, `commands`: (N, n) and (N, K, k), see `Plant`: the first command belongs to the period; carriers
           move on to a second.
         - `history`, `tensions`: results, (N, 2, n) and (N, 2, m) [N].
+        - `means`: results, (N, m) [N], with which the momentum of the bodies changes.
         """
-        of_rows = (states, commands, history, tensions)
+        of_rows = (states, commands, history, tensions, means)
         run_plant(self.record, self._settings, *of_rows, 1, self.period, self._substeps, 1)

@@ -278,7 +278,7 @@ class Plant:
             return None
         history, tensions = np.empty((1, 2, self.size)), np.empty((1, 2, self.robot.m))
         given = np.ascontiguousarray(state), np.ascontiguousarray(rows)
-        run_plant(self.record, self.settings, given[0], given[1], history, tensions, 1, dt, 1, 1)
+        run_plant(self.record, self.settings, given[0], given[1], history, tensions, None, 1, dt, 1, 1)
         return history[0, 1] if math.isfinite(np.vdot(history, history)) else None
 
     def run(
@@ -331,7 +331,7 @@ class Plant:
         def run_rows(begin: int, end: int) -> None:
             some = slice(begin, end)
             given = states[some], rows[some], history[some], tensions[some]
-            run_plant(self.record, self.settings, *given, steps, period, substeps, keep)
+            run_plant(self.record, self.settings, *given, None, steps, period, substeps, keep)
 
         worth = count * steps * substeps // STEPS_WORTH_A_THREAD
         threads = min(processors.available(), worth) if threads is None else whole_number("threads", threads, 1, 10**4)

@@ -39,7 +39,7 @@ class Orders:
         self._record = plant.record if record is None else record
         rigid = np.flatnonzero(plant.record["cable"]["stiffness"][: robot.m] == 0)
         self._rigid = int(rigid[0]) if rigid.size else None  # a cable with tensions that no length determines
-        self._last_rates = np.full((len(seeds), robot.m), np.nan)
+        self._last = np.full((len(seeds), 2, robot.m), np.nan)  # lengths and rates
         wind = conditions.wind
         self.wind = None if wind is None else np.stack([_air(wind, times, seed) for seed in seeds], axis=1)
         calm = None if self.wind is None else np.zeros(3)
@@ -94,7 +94,7 @@ class Orders:
         elif self._drive == "lengths" and self._fixed:
             self._cables[:] = states[:, self._commanded]
         else:
-            tensions = np.ascontiguousarray(command.tensions, dtype=float).reshape(self._last_rates.shape)
+            tensions = np.ascontiguousarray(command.tensions, dtype=float).reshape(len(self._last), -1)
             if drives is not None:
                 tensions = drives.tensions(tensions, lengths[:, 1])
             if self._drive != "lengths":
@@ -105,7 +105,7 @@ class Orders:
                     f"cables[{self._rigid}]"
                 )
             else:
-                winch_lengths(self._record, states, lengths, tensions, self._last_rates, self._rows, self._period)
+                winch_lengths(self._record, states, lengths, tensions, self._last, self._rows, self._period)
         if self._moves:
             begins = self._begins
             for begin, ordered in zip(begins, command[1:4], strict=True):

@@ -100,6 +100,7 @@ def fly(
     history, tensions = np.zeros((flights, 2, plant.size)), np.zeros((flights, 2, m))
     end, numbers = history[:, 1], history.reshape(-1)
     between, pulls = motions.copy(), np.tile(start, (flights, 1))  # pulls: means of the last period
+    own = pulls.copy()
     sensors, pilot = Sensors(conditions.noise, seeds, period, m), Pilot(controllers, flights, conditions)
     orders = Orders(plant, conditions, seeds, periods.record)
     lasted, alive, going = np.zeros(flights, dtype=int), np.ones(flights, dtype=bool), True
@@ -137,10 +138,9 @@ def fly(
             except (TypeError, ValueError):
                 check_command(command, robot, flights, time)
                 raise
-            periods.run(states, row, history, tensions)
-            own = np.add(tensions[:, 0], tensions[:, 1])
-            pulls = pulls + own if part else own
-        pulls *= 0.5 / parts
+            periods.run(states, row, history, tensions, own)
+            pulls = pulls + own if part else own.copy()
+        pulls /= parts
         if not isfinite(_square(numbers)):
             check_command(command, robot, flights, time)
             alive &= (np.abs(end) < BEYOND).all(axis=1)

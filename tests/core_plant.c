@@ -35,7 +35,7 @@ int main(int argc, char **argv) {
     double *history = numbers(rows * kept * size), *tensions = numbers(rows * kept * m);
     double *motions = numbers(rows * kept * bodies * 12), *lengths = numbers(rows * kept * 2 * m);
     const towline_run run = {rows, steps, steps, keep, atoi(argv[4]), atof(argv[5])};
-    towline_plant_run(robot, plant, &run, states, commands, history, tensions);
+    towline_plant_run(robot, plant, &run, states, commands, history, tensions, NULL);
     towline_plant_sense(robot, rows * kept, history, motions, lengths);
     fwrite(history, sizeof *history, (size_t)(rows * kept * size), stdout);
     fwrite(tensions, sizeof *tensions, (size_t)(rows * kept * m), stdout);

@@ -60,7 +60,7 @@ def test_any_numbers_are_safe_and_good_ones_have_the_same_bits(program, name, dr
         array.flat[rng.integers(array.size)] = rng.choice(NONSENSE)
     kept = 1 + STEPS // KEEP
     history, tensions = np.zeros((ROWS, kept, plant.size)), np.zeros((ROWS, kept, plant.robot.m))
-    run_plant(plant.record, plant.settings, states, commands, history, tensions, STEPS, PERIOD, SUBSTEPS, KEEP)
+    run_plant(plant.record, plant.settings, states, commands, history, tensions, None, STEPS, PERIOD, SUBSTEPS, KEEP)
     motions = np.zeros((ROWS, kept, 1 + len(plant.robot.carriers), 12))
     lengths = np.zeros((ROWS, kept, 2, plant.robot.m))
     sense(plant.record, history, motions, lengths)
@@ -80,4 +80,4 @@ def test_no_rows_are_no_work():
     plant = Plant("cogiro")
     states, commands = np.empty((0, plant.size)), np.empty((0, 1, len(plant.command(np.ones(plant.robot.m)))))
     history, tensions = np.empty((0, 2, plant.size)), np.empty((0, 2, plant.robot.m))
-    run_plant(plant.record, plant.settings, states, commands, history, tensions, 1, 1e-3, 1, 1)
+    run_plant(plant.record, plant.settings, states, commands, history, tensions, None, 1, 1e-3, 1, 1)

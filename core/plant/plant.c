@@ -44,13 +44,14 @@ static int is_torn(const plant *p) {
 
 /* Run one row: its state, commands, and places in the history. */
 static void run_row(plant *p, const towline_run *run, const double *state, const double *commands, double *history,
-                    double *tensions) {
+                    double *tensions, double *means) {
     const ptrdiff_t size = towline_plant_state_size(p->robot), width = towline_plant_command_size(p->robot);
     const double step = run->period / run->substeps;
     motion now;
     step_memory memory;
     take_state(p, state, &now);
     for (int k = 0; k < SLOPES; k++) { clear(p, &memory.slope[k]); }
+    memset(memory.impulse, 0, sizeof memory.impulse);
     for (ptrdiff_t k = 0; k < run->steps; k++) {
         const double *row = commands + k * width;
         begin_command(p, &now, row, k + 1 < run->commands ? row + width : NULL, run->period);
@@ -66,6 +67,7 @@ static void run_row(plant *p, const towline_run *run, const double *state, const
         }
         memcpy(p->reference, p->commanded, (size_t)p->cables * sizeof p->reference[0]);
     }
+    for (int i = 0; means && i < p->cables; i++) { means[i] = memory.impulse[i] / (run->period * (double)run->steps); }
     if (run->steps % run->keep == 0) {
         set_geometry(p, &now, &memory.slope[0], run->period); /* puts imposed carriers where they are */
         record_state(p, &now, history + run->steps / run->keep * size);
@@ -76,13 +78,14 @@ static void run_row(plant *p, const towline_run *run, const double *state, const
 }
 
 void towline_plant_run(const towline_robot *robot, const towline_plant *settings, const towline_run *run,
-                       const double *states, const double *commands, double *history, double *tensions) {
+                       const double *states, const double *commands, double *history, double *tensions, double *means) {
     const ptrdiff_t kept = 1 + run->steps / run->keep, size = towline_plant_state_size(robot);
     plant p;
     set_plant(&p, robot, settings);
     for (ptrdiff_t row = 0; row < run->rows; row++) {
         run_row(&p, run, states + row * size, commands + row * run->commands * towline_plant_command_size(robot),
-                history + row * kept * size, tensions + row * kept * robot->cables);
+                history + row * kept * size, tensions + row * kept * robot->cables,
+                means ? means + row * robot->cables : NULL);
     }
 }
 

@@ -55,10 +55,12 @@ ptrdiff_t towline_plant_command_size(const towline_robot *robot);
 /*
  * Run each row. The history (rows, 1 + steps / keep, state) gets every state of which the number is a multiple of
  * `keep`, after the impacts of the command that begins there, and `tensions` (.., m) those there under that command
- * [N]; at the end, the state that the last command leaves and the tensions under it.
+ * [N]; at the end, the state that the last command leaves and the tensions under it. `means` (rows, m) gets the mean
+ * tensions of all steps, with which the momentum of each body changes; it may be NULL.
  */
 void towline_plant_run(const towline_robot *robot, const towline_plant *plant, const towline_run *run,
-                       const double *states, const double *commands, double *history, double *tensions);
+                       const double *states, const double *commands, double *history, double *tensions,
+                       double *means);
 
 /*
  * What perfect sensors measure of states: `motions` (rows, 1 + carriers, 12), pose and its time derivative of platform
@@ -72,10 +74,10 @@ void towline_plant_sense(const towline_robot *robot, ptrdiff_t rows, const doubl
  * The unstrained lengths that winches without a model reach within a period, so that tensions are as ordered; see
  * winch_lengths.c. All arrays are rows of m numbers, but `states`, whole states, `lengths`, rows of 2 m as from
  * `towline_plant_sense`, and `commands`, `commands_per` numbers from one row's command to the next, of which those of
- * the cables are written. `last_rates` has the rates one period before [m/s], nan if there was none, and gets those now.
+ * the cables are written. `last` has the lengths one period before, nan if there were none, and gets those now.
  */
 void towline_plant_winch_lengths(const towline_robot *robot, ptrdiff_t rows, double period, const double *states,
-                                 const double *lengths, const double *tensions, double *last_rates, double *commands,
+                                 const double *lengths, const double *tensions, double *last, double *commands,
                                  ptrdiff_t commands_per);
 
 /*

@@ -24,6 +24,8 @@ enum { SLOPES = 5 };
 typedef struct {
     motion slope[SLOPES], trial;
     double stretch[CABLES], stretch_rate[CABLES]; /* at the low end of the bracket of a change */
+    /* Tensions at the beginning of a step, 6 times their mean in it [N], and their integral over a run [N s]. */
+    double first[CABLES], mean[CABLES], impulse[CABLES];
 } step_memory;
 
 /* to = from + h slope, for n numbers. */
@@ -78,10 +80,12 @@ static void copy(const plant *p, const motion *from, motion *to) {
 /* Write into `trial` what `from` becomes after a step with its modes; return by how much it is beyond them. */
 static double attempt(plant *p, const motion *from, step_memory *of, double time, double step) {
     motion *slope = of->slope, *trial = &of->trial;
+    memcpy(of->mean, of->first, (size_t)p->cables * sizeof of->mean[0]);
     for (int stage = 1; stage < 4; stage++) {
         const double share = stage == 3 ? step : 0.5 * step;
         move_on(p, from, share, &slope[stage - 1], trial);
         evaluate(p, trial, &slope[stage], time + share);
+        for (int i = 0; i < p->cables; i++) { of->mean[i] += (stage == 3 ? 1 : 2) * p->cable[i].tension; }
     }
     sum_slopes(p, slope);
     move_on(p, from, step / 6, &slope[3], trial);
@@ -178,8 +182,10 @@ static void advance(plant *p, motion *now, step_memory *of, double time, double 
     copy(p, now, &of->trial);
     while (left > 1e-14 * step) {
         int changes;
+        record_tensions(p, of->first);
         const double passed = step_to_change(p, now, of, time, left, events < MOST_EVENTS, &changes);
         copy(p, &of->trial, now);
+        for (int i = 0; i < p->cables; i++) { of->impulse[i] += passed / 6 * of->mean[i]; }
         time += passed;
         left -= passed;
         if (changes) {

@@ -74,11 +74,11 @@ FUNCTION(control_carriers, "(robot, tethers, motion, carriers)",
          "Compute how carriers move if the platform and those coordinates do.")
 
 /* plant.c */
-FUNCTION(run_plant, "(robot, settings, states, commands, history, tensions, steps, period, substeps, keep)",
-         "Run each state under its commands, and write every keep-th state and its tensions.")
+FUNCTION(run_plant, "(robot, settings, states, commands, history, tensions, means, steps, period, substeps, keep)",
+         "Run each state under its commands, and write every keep-th state and its tensions, and mean tensions.")
 FUNCTION(sense, "(robot, states, motions, lengths)",
          "Write the motions of platform and carriers in states of a plant, and lengths of the cables with their rates.")
 FUNCTION(winch_forces, "(robot, settings, states, commands, period)",
          "Replace the tensions in commands of a plant by the forces of motors that give them.")
-FUNCTION(winch_lengths, "(robot, states, lengths, tensions, last_rates, commands, period)",
+FUNCTION(winch_lengths, "(robot, states, lengths, tensions, last, commands, period)",
          "Write the unstrained lengths that give tensions within a period into commands of a plant.")

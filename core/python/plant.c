@@ -16,7 +16,7 @@ static int whole_number(PyObject *argument, Py_ssize_t most, Py_ssize_t *number)
 }
 
 TOWLINE_PY(run_plant) {
-    enum { ROBOT, SETTINGS, STATES, COMMANDS, HISTORY, TENSIONS, ARRAYS };
+    enum { ROBOT, SETTINGS, STATES, COMMANDS, HISTORY, TENSIONS, MEANS, ARRAYS };
     enum { STEPS = ARRAYS, PERIOD, SUBSTEPS, KEEP, ALL };
     arrays given;
     Py_ssize_t steps, substeps, keep;
@@ -32,7 +32,7 @@ TOWLINE_PY(run_plant) {
     }
     const towline_robot *robot = robot_of(&given);
     int fits = robot && given.of[SETTINGS] && given.view[SETTINGS].len == (Py_ssize_t)sizeof(towline_plant);
-    for (int i = STATES; i < ARRAYS; i++) { fits = fits && given.of[i]; }
+    for (int i = STATES; i < MEANS; i++) { fits = fits && given.of[i]; }
     Py_ssize_t rows = 0, commands = steps;
     if (fits) {
         const Py_ssize_t size = towline_plant_state_size(robot), width = towline_plant_command_size(robot);
@@ -41,12 +41,13 @@ TOWLINE_PY(run_plant) {
         commands = rows ? given.size[COMMANDS] / width / rows : steps;
         fits = given.size[STATES] == rows * size && given.size[COMMANDS] == rows * commands * width &&
                commands >= steps && (!rows || kept <= PTRDIFF_MAX / rows / (size * DOUBLE)) &&
-               given.size[HISTORY] == rows * kept * size && given.size[TENSIONS] == rows * kept * robot->cables;
+               given.size[HISTORY] == rows * kept * size && given.size[TENSIONS] == rows * kept * robot->cables &&
+               (!given.of[MEANS] || given.size[MEANS] == rows * robot->cables);
     }
     const towline_run run = {rows, commands, steps, keep, (int32_t)substeps, period};
     FINISH(&given, fits,
            towline_plant_run(robot, (const void *)given.of[SETTINGS], &run, given.of[STATES], given.of[COMMANDS],
-                             given.of[HISTORY], given.of[TENSIONS]));
+                             given.of[HISTORY], given.of[TENSIONS], given.of[MEANS]));
 }
 
 TOWLINE_PY(sense) {
@@ -86,14 +87,14 @@ TOWLINE_PY(winch_forces) {
 }
 
 TOWLINE_PY(winch_lengths) {
-    enum { ROBOT, STATES, LENGTHS, TENSIONS, LAST_RATES, COMMANDS, ARRAYS, PERIOD = ARRAYS, ALL };
+    enum { ROBOT, STATES, LENGTHS, TENSIONS, LAST, COMMANDS, ARRAYS, PERIOD = ARRAYS, ALL };
     arrays given;
     if (count != ALL) {
         PyErr_Format(PyExc_TypeError, "winch_lengths takes %d arguments, got %zd", (int)ALL, count);
         return NULL;
     }
     const double period = PyFloat_AsDouble(arguments[PERIOD]);
-    if ((period == -1 && PyErr_Occurred()) || !take(&given, arguments, ARRAYS, ARRAYS, LAST_RATES)) { return NULL; }
+    if ((period == -1 && PyErr_Occurred()) || !take(&given, arguments, ARRAYS, ARRAYS, LAST)) { return NULL; }
     const towline_robot *robot = robot_of(&given);
     int fits = robot != NULL;
     for (int i = STATES; i < ARRAYS; i++) { fits = fits && given.of[i]; }
@@ -102,11 +103,11 @@ TOWLINE_PY(winch_lengths) {
         const Py_ssize_t rows = given.size[STATES] / size, m = robot->cables;
         const Py_ssize_t per = rows ? given.size[COMMANDS] / rows : width;
         fits = given.size[STATES] == rows * size && given.size[LENGTHS] == rows * 2 * m &&
-               given.size[TENSIONS] == rows * m && given.size[LAST_RATES] == rows * m &&
+               given.size[TENSIONS] == rows * m && given.size[LAST] == rows * 2 * m &&
                given.size[COMMANDS] == rows * per && per >= width;
         if (fits) {
             towline_plant_winch_lengths(robot, rows, period, given.of[STATES], given.of[LENGTHS], given.of[TENSIONS],
-                                        given.of[LAST_RATES], given.of[COMMANDS], per);
+                                        given.of[LAST], given.of[COMMANDS], per);
         }
     }
     return done(&given, fits);

@@ -58,7 +58,7 @@ def data_at(robot: Robot, plant: Plant, reference: Reference) -> dict[str, Any]:
         "winding_time": min(winding_time(plant), LONGEST),
         "mass": robot.platform.mass,
         "state": state,
-        "last_rates": np.full(robot.m, np.nan),
+        "last": np.full(2 * robot.m, np.nan),
         "known": record_of(robot),
         "period": PERIOD,
         **controller.data(),

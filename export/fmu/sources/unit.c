@@ -146,7 +146,8 @@ static int order_carrier(const towline_unit *unit, int carrier, const double *ti
 }
 
 /* Move a state by a step between two times after the order [s]; return 0 if the motion diverges. */
-static int move_state(towline_unit *unit, const double *times, int32_t substeps, double *state, double *tensions) {
+static int move_state(towline_unit *unit, const double *times, int32_t substeps, double *state, double *tensions,
+                      double *means) {
     const towline_robot *robot = &unit->robot;
     const ptrdiff_t m = robot->cables, size = towline_plant_state_size(robot);
     const ptrdiff_t width = towline_plant_command_size(robot);
@@ -160,7 +161,7 @@ static int move_state(towline_unit *unit, const double *times, int32_t substeps,
     memcpy(cables, unit->cables == UNIT_WINCHES ? unit->winches : unit->tensions, (size_t)m * sizeof *cables);
     if (unit->cables == UNIT_BY_LENGTHS) {
         towline_plant_sense(robot, 1, state, motions, lengths);
-        towline_plant_winch_lengths(robot, 1, step, state, lengths, unit->tensions, unit->last_rates, commands, width);
+        towline_plant_winch_lengths(robot, 1, step, state, lengths, unit->tensions, unit->last, commands, width);
     }
     for (int c = 0; c < robot->carriers; c++) {
         double *begin = carriers + TOWLINE_CARRIER_COMMANDS * c;
@@ -170,7 +171,7 @@ static int move_state(towline_unit *unit, const double *times, int32_t substeps,
         towline_plant_winch_forces(robot, &unit->plant, 1, 1 + leads, step, state, commands);
     }
     const towline_run run = {1, 1 + leads, 1, 1, substeps, step};
-    towline_plant_run(robot, &unit->plant, &run, state, commands, history, tensions);
+    towline_plant_run(robot, &unit->plant, &run, state, commands, history, tensions, means);
     if (!are_finite(history, 2 * size) || !are_finite(tensions, 2 * m)) { return 0; }
     memcpy(state, history + size, (size_t)size * sizeof *history);
     return 1;
@@ -181,18 +182,18 @@ static int simulate(towline_unit *unit, double step) {
     const ptrdiff_t m = unit->robot.cables;
     const double all = fmax(ceil(step / unit->longest_step - ROUNDING), 1);
     const double parts = unit->cables >= UNIT_BY_LENGTHS ? fmax(floor(step / unit->winding_time + 0.5), 1) : 1;
-    double state[UNIT_STATE], tensions[2 * UNIT_CABLES], sums[UNIT_CABLES] = {0};
+    double state[UNIT_STATE], tensions[2 * UNIT_CABLES], means[UNIT_CABLES], sums[UNIT_CABLES] = {0};
     if (!(all <= MOST_STEPS && parts <= MOST_STEPS)) { return 0; }
     memcpy(state, unit->state, sizeof state);
     for (double part = 0; part < parts; part++) {
         const double times[2] = {part * step / parts, (part + 1) * step / parts};
-        if (!move_state(unit, times, (int32_t)ceil(all / parts), state, tensions)) { return 0; }
-        for (ptrdiff_t i = 0; i < m; i++) { sums[i] += tensions[i] + tensions[m + i]; }
+        if (!move_state(unit, times, (int32_t)ceil(all / parts), state, tensions, means)) { return 0; }
+        for (ptrdiff_t i = 0; i < m; i++) { sums[i] += means[i]; }
     }
     memcpy(unit->state, state, sizeof state);
     for (ptrdiff_t i = 0; i < m; i++) {
         unit->tension[i] = tensions[m + i];
-        unit->mean_tension[i] = 0.5 * sums[i] / parts;
+        unit->mean_tension[i] = sums[i] / parts;
     }
     towline_unit_sense(unit);
     return 1;
