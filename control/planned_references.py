@@ -55,7 +55,7 @@ def planned(plan: "HasTrajectory | xr.Dataset | str | os.PathLike[str]") -> tupl
     samples = samples_of("plan", plan)
     if samples is None or "robot" not in samples.attributes:
         raise InputError(f"plan must be a plan, its dataset or its NetCDF file, got {shown(plan)}")
-    robot = getattr(getattr(plan, "scenario", plan), "robot", None)
+    robot = None if hasattr(plan, "data_vars") else getattr(getattr(plan, "scenario", plan), "robot", None)
     robot = robot if isinstance(robot, Robot) else _robot(str(samples.attributes["robot"]))
     return robot, read_trajectory(robot, samples, None)
 

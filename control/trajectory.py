@@ -60,12 +60,12 @@ def samples_of(name: str, given: object) -> Contents | None:
 
     Raises `InputError`, with the `name` of the argument, if no such file can be read.
     """
-    # Without loading xarray, unless somebody has the dataset, and may have changed it.
-    contents = given if "trajectory" in getattr(given, "__dict__", {}) else getattr(given, "_contents", given)
-    if isinstance(contents, Contents):
-        return contents
     samples: Any = _loaded(name, given) if isinstance(given, str | os.PathLike) else given
-    if not hasattr(samples, "data_vars"):
+    if not hasattr(samples, "data_vars"):  # first, because a dataset searches long for similar names
+        # Without loading xarray, unless somebody has the dataset, and may have changed it.
+        contents = given if "trajectory" in getattr(given, "__dict__", {}) else getattr(given, "_contents", given)
+        if isinstance(contents, Contents):
+            return contents
         samples = getattr(given, "trajectory", None)
     return Contents.of(samples) if hasattr(samples, "data_vars") else None
 

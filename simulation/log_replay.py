@@ -138,7 +138,9 @@ class Replay(Drawn, Reported, Displayed):
         if self.fitted is None:
             return "no fit was asked for"
         same = to_yaml(self.robot) == to_yaml(self.windows.recorded.robot)
-        return "no parameter of the robot's file reduces the residuals of validation windows" if same else None
+        few = len(self.windows.starts) <= BLOCK  # half of which hardly show how much a fitted value scatters
+        advice = f", of which there are few: try a window shorter than {self.windows.window:g} s" if few else ""
+        return f"no parameter of the robot's file reduces the residuals of validation windows{advice}" if same else None
 
     def save_robot(self, file: str | os.PathLike[str]) -> Path:
         """Write the fitted robot as a robot file atomically.

@@ -16,7 +16,7 @@ class Parameters(NamedTuple):
 
     delay: float = 0.0  # time by which the robot is later than its recorded commands [s]
     friction: float = 0.0  # dry friction of the winches, as a force on each cable, the mean over the cables [N]
-    # mass of the platform and stiffness of the cables, as factors of the file's
+    # mass and inertia of the platform, and stiffness of the cables, as factors of the file's
     mass: float = 1.0
     stiffness: float = 1.0
     tilt: tuple[float, ...] = (0.0, 0.0)  # rotation of gravity about x and y of {G} [rad]
@@ -65,7 +65,9 @@ def changed(robot: Robot, to: Parameters) -> Robot:
             changes["winch"] = winch
         cables.append(cable.model_copy(update=changes))
     com = tuple(np.add(robot.platform.com, to.com).tolist())
-    platform = robot.platform.model_copy(update={"mass": robot.platform.mass * to.mass, "com": com})
+    inertia = robot.platform.inertia and tuple(to.mass * part for part in robot.platform.inertia)
+    heavier = {"mass": robot.platform.mass * to.mass, "inertia": inertia, "com": com}
+    platform = robot.platform.model_copy(update=heavier)
     gravity = Rotation.from_rotvec([*to.tilt, 0.0]).apply(robot.gravity) if any(to.tilt) else robot.gravity
     return robot.model_copy(update={"cables": tuple(cables), "platform": platform, "gravity": tuple(gravity)})
 

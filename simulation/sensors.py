@@ -1,6 +1,7 @@
 """`Sensors`: readings with the errors, resolution, rate and delay of a `Noise`."""
 
 from collections.abc import Sequence
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +26,7 @@ class Sensors:
 
     def __init__(self, noise: Noise, seeds: Sequence[int], period: float, m: int):
         self._noise, self._period, self._m = noise, period, m
-        self._delay = round(noise.delay / period)
+        self._delay = ceil(noise.delay / period - EARLY)
         self._exact = not noise.model_dump(exclude=_WHEN, exclude_defaults=True)
         self._random = [np.random.default_rng([seed, 1]) for seed in seeds]
         draws = [random.normal(size=12 + m) for random in self._random]

@@ -236,7 +236,7 @@ def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> t
         if not (step := event.longest_step(robot)) * MOST_PARTS >= period:
             raise InputError(
                 f"{where} must change so slowly that it may be held for {period / MOST_PARTS:g} s, 1/{MOST_PARTS} of "
-                f"the period, got {step:.3g} s"
+                f"the period, got {step:.3g} s: {event.describe(robot)}"
             )
         if isinstance(event, Stick):
             _check_winches(robot, drive, where)

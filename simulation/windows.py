@@ -252,7 +252,7 @@ class Windows:
         robot, (A, wrench) = self.robot, self._balance
         usual = np.minimum(robot.t_min + 0.1 * (robot.t_max - robot.t_min), 2 * robot.force_scale)
         scale = robot.wrench_scale * (robot.dof_mask > 0)
-        missing = scale * (wrench * np.repeat([with_.mass, 1.0], 3) - A @ usual)
+        missing = scale * (wrench * with_.mass - A @ usual)
         turned = np.array(changed(robot, with_).gravity) - robot.gravity
         missing[..., :3] -= scale[:3] * with_.mass * robot.platform.mass * turned
         return (usual + (np.linalg.pinv(scale[:, None] * A, rcond=1e-6) @ missing[..., None])[..., 0]).clip(0.0)

@@ -295,7 +295,7 @@ def test_wrong_calls_are_refused(unit):
 
 
 def test_whatever_sensors_report_tensions_are_in_their_limits(unit):
-    """Also for no numbers, for which the last command is held."""
+    """Also for no numbers, for which the reference tensions are commanded."""
     robot, one = load("cogiro"), unit("cogiro", "controller")
     names = [name for name in one.names("input") if not name.endswith("jerk")]
     numbers = st.one_of(st.floats(), st.floats(-10, 10))

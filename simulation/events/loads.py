@@ -152,7 +152,8 @@ class Wall(Lasting):
 
     @override
     def describe(self, robot: Robot) -> str:
-        return f"a wall of {quantity(self.stiffness, 'N/m')} appeared"
+        damped = f" and a damping of {quantity(self.damping, 'N s/m')}" if self.damping else ""
+        return f"a wall with a stiffness of {quantity(self.stiffness, 'N/m')}{damped} appeared"
 
     @override
     def longest_step(self, robot: Robot) -> float:
