@@ -27,7 +27,7 @@ class Noise(Part):
     rate: float | None = optional(
         "rate of all sensors [1/s]; between readings the last one is held; default: each period", ge=0.1, le=1e6
     )
-    delay: float = optional("delay of all sensors [s]; controllers get readings in the first period after it", 0.0, ge=0, le=10)
+    delay: float = optional("delay of all sensors [s]; readings count from the next period on", 0.0, ge=0, le=10)
     stamped: bool = optional("true: states have the time of their measurement, from which controllers predict", False)
 
     @property

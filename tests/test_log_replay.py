@@ -31,7 +31,9 @@ def with_cables(robot, **changes):
 
 def with_mass(robot, factor):
     platform = robot.platform
-    return robot.model_copy(update={"platform": platform.model_copy(update={"mass": factor * platform.mass})})
+    inertia = platform.inertia and tuple(factor * part for part in platform.inertia)
+    heavier = platform.model_copy(update={"mass": factor * platform.mass, "inertia": inertia})
+    return robot.model_copy(update={"platform": heavier})
 
 
 PLANAR = with_cables(load("planar-4"), stiffness=20e3, damping=20.0)
@@ -407,12 +409,23 @@ def test_the_command_fits_and_writes_what_validation_windows_confirm(tmp_path):
     answer = json.loads(done.stdout)
     assert answer["explained_by"] == ["mass"]
     assert answer["validation"][1] < 2 < 10 < answer["validation"][0]
-    assert load(tmp_path / "fitted.yaml").platform.mass == pytest.approx(4.0, rel=2e-3)
+    fitted, true = load(tmp_path / "fitted.yaml").platform, load("planar-4").platform
+    assert fitted.mass == pytest.approx(4.0, rel=2e-3)
+    assert fitted.inertia == pytest.approx(true.inertia, rel=2e-3)
     assert (tmp_path / "drawn" / "replay.png").read_bytes().startswith(b"\x89PNG")
     with xr.open_dataset(tmp_path / answer["file"]) as saved:
         assert saved.position_residual.dims == ("window", "sample", "axis")
     with pytest.raises(InputError, match="the robot is not written: no parameter"):
         replay(load(tmp_path / "fitted.yaml"), log, fit=True).save_robot(tmp_path / "again.yaml")
+
+
+def test_a_fit_to_a_short_recording_needs_short_windows(tmp_path):
+    log = written(tmp_path / "short.csv", columns("tensions", slice(1000, 2800, 10)))
+    heavy = with_mass(load("planar-4"), 1.2)
+    few = replay(heavy, log, fit=True)
+    assert few.named == ["mass"]
+    assert "of which there are few: try a window shorter than 0.5 s" in few.refused
+    assert replay(heavy, log, fit=True, window=0.2).robot.platform.mass == pytest.approx(4.0, rel=2e-3)
 
 
 HEAD = "t [s],x [m],y [m],z [m],roll [rad],pitch [rad],yaw [rad],l0 [m],l1 [m],l2 [m],l3 [m]\n"
