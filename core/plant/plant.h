@@ -59,8 +59,7 @@ ptrdiff_t towline_plant_command_size(const towline_robot *robot);
  * tensions of all steps, with which the momentum of each body changes; it may be NULL.
  */
 void towline_plant_run(const towline_robot *robot, const towline_plant *plant, const towline_run *run,
-                       const double *states, const double *commands, double *history, double *tensions,
-                       double *means);
+                       const double *states, const double *commands, double *history, double *tensions, double *means);
 
 /*
  * What perfect sensors measure of states: `motions` (rows, 1 + carriers, 12), pose and its time derivative of platform
