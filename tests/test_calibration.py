@@ -366,6 +366,24 @@ def test_neighbours_that_are_alike_make_parameters_less_certain():
     assert not independent.slips
 
 
+@pytest.mark.parametrize("stated", [{"lengths": 1e-3}, {"lengths": 1e-3, "position": 5e-4, "rotation": 1e-3}])
+def test_noise_of_smoothed_poses_does_not_make_a_model_incomplete(stated):
+    """They are only as uncertain as readings with independent errors that are as large, or less."""
+    draw, times = np.random.default_rng(2), 0.02 * np.arange(1200)
+    swing = np.sin(np.outer(times, [1.1, 0.7, 0.9, 0.6, 0.8, 0.5]))
+    poses = load("cogiro").home + [1, 0.8, 0.3, 0.1, 0.1, 0.15] * swing
+    built = as_built(0, 3, poses=poses)
+    noisy = poses + draw.normal(0, 1, poses.shape) * [*[5e-4] * 3, *[1e-3] * 3]
+    found = calibrate("cogiro", Measurements(built.readings, noisy, times=times, sigma=stated))
+    assert "clock" in found.free
+    assert "model is incomplete" not in str(found.report)
+    if "position" in stated:
+        assert found.noise < 0.9e-3  # smoothed poses have less noise than stated
+        assert found.autocorrelation < 1.2
+    else:
+        assert 1 < found.autocorrelation < 3
+
+
 def test_readings_taken_four_times_are_as_good_as_one():
     """The covariance is four times that of independent readings, known from 25 blocks in 32 directions."""
     ratios = []

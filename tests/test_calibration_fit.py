@@ -204,9 +204,9 @@ def test_autocorrelation_is_the_same_in_parts(monkeypatch):
     log = Measurements(Dynamics(robot).cable_lengths(poses), poses, times=times, tensions=tensions, sigma=sigma)
     model = model_of(robot, log, ("anchors", "clock", "mass", "com", "friction"), {})
     p = int(model.parameters.varies.sum())
-    whole, factor = information_of(model, model.begin(), np.eye(p), np.eye(p))
+    whole, factor, _ = information_of(model, model.begin(), np.eye(p), np.eye(p))
     monkeypatch.setattr(model_module, "PART", 60)
-    parts, again = information_of(model, model.begin(), np.eye(p), np.eye(p))
+    parts, again, _ = information_of(model, model.begin(), np.eye(p), np.eye(p))
     assert factor > 2
     assert again == pytest.approx(factor, rel=1e-9)
     np.testing.assert_allclose(parts, whole, rtol=1e-6, atol=1e-9 * np.abs(whole).max())

@@ -54,8 +54,8 @@ class Equations(NamedTuple):
         return cls(inverse @ X, (inverse @ residuals[..., None])[..., 0], (vectors * roots) @ back)
 
 
-def information_of(model: Model, state: State, root: np.ndarray, white: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return root'M root (r, r), and the factor by which autocorrelation increases variances on average, at least 1.
+def information_of(model: Model, state: State, root: np.ndarray, white: np.ndarray) -> tuple[np.ndarray, float, int]:
+    """Return root'M root (r, r), the factor of variances on average, at least 1, and for how many samples errors last.
 
     - `root`: square root of the covariance of the parameters for independent errors with a sigma of 1, (p, r).
     - `white`: the result for independent errors, (r, r).
@@ -86,7 +86,7 @@ def information_of(model: Model, state: State, root: np.ndarray, white: np.ndarr
         ]
         r = [_correlation(*of) for of in found]
         if max(map(len, r)) == 1:
-            return white, 1.0
+            return white, 1.0, 0
         M = sum((_added(kinds[0], r[0]) for kinds in every()), white)
     # Errors and derivatives may change together, as where a platform rests, and errors of forces differ by direction.
     first = np.concatenate([[1.0], np.full(lags - 1, 2.0)])
@@ -99,10 +99,10 @@ def information_of(model: Model, state: State, root: np.ndarray, white: np.ndarr
     if count >= FEWEST and own > factor * (1 + BY_CHANCE * np.sqrt(4 * max(map(len, r)) / (count * usual))):
         M, factor = M * own / factor, own
     if factor <= 1:
-        return white, 1.0
+        return white, 1.0, 0
     values, vectors = np.linalg.eigh(M)  # a sum of finitely many lags may be negative somewhere
     least = np.einsum("ri,rs,si->i", vectors, white, vectors)
-    return (vectors * np.maximum(values, least)) @ vectors.T, factor
+    return (vectors * np.maximum(values, least)) @ vectors.T, factor, max(map(len, r)) - 1
 
 
 def _joined(held: list[list[Equations]]) -> list[Equations]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...models import points
 from ..logs.measurements import ARRAYS
-from ..pose.estimate import largest_cost
+from ..pose.estimate import FALSE_ALARM_IN_LOG, largest_cost
 from ..pose.wrong_lengths import TOLD_APART
 from .fit import fit, held, settled
 from .model import Model, State
@@ -22,7 +22,7 @@ from .parameters import Parameters
 from .products import quadratic_forms
 from .projection import Projected, parts, project
 
-LEVEL = 0.005  # of both tests, for all readings together, and share of sound ones among several outliers
+LEVEL = 0.005  # share of sound readings among several outliers
 LEAST_THRESHOLD = 5.0  # sigmas; errors have longer tails than the normal distribution
 SMALLEST_REDUNDANCY = 0.02  # a reading with less hardly shows its own errors
 SHORTEST = 5  # samples on each side of a slip
@@ -67,7 +67,7 @@ class Slip(NamedTuple):
 def _threshold(count: int) -> float:
     from scipy.special import ndtri
 
-    return max(LEAST_THRESHOLD, float(-ndtri(LEVEL / max(count, 1))))
+    return max(LEAST_THRESHOLD, float(-ndtri(FALSE_ALARM_IN_LOG / 2 / max(count, 1))))
 
 
 def _limit(sizes: np.ndarray, count: int, known: int) -> float:

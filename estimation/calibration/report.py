@@ -180,8 +180,10 @@ def _of_noise(result: CalibrationData) -> list[str]:
         )
     if result.autocorrelation > 1:
         tense = result.measurements.tensions is not None or hangs(result.file, result.measurements)
+        lasting = f"perhaps because the model is incomplete{'' if tense else UNKNOWN}"
+        cause = lasting if result._noise.lasting else "because the poses are smoothed"
         lines.append(
-            f"residuals are autocorrelated, perhaps because the model is incomplete{'' if tense else UNKNOWN}: "
+            f"residuals are autocorrelated, {cause}: "
             f"the standard deviations below are multiplied by {quantity(result.autocorrelation**0.5, digits=2)}"
         )
     return lines

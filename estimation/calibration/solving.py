@@ -45,7 +45,8 @@ class Noise(NamedTuple):
 
     Attributes:
         excess: Ratio of residuals to their sigmas: root of the sum of squares over the redundancy; nan without any.
-        autocorrelation: Factor of the variances because errors are autocorrelated.
+        autocorrelation: Factor of the variances because errors are autocorrelated, at least 1.
+        lasting: Whether they are for longer than smoothing of the poses makes them.
         redundancy: Number of readings minus number of unknowns, of which priors determine a part.
         covariance, information: Those of the parameters, in metres, (p, p), zero along unobservable directions.
         repeating: Errors of lengths that repeat with the pose or the lengths, or None.
@@ -53,6 +54,7 @@ class Noise(NamedTuple):
 
     excess: float
     autocorrelation: float
+    lasting: bool
     redundancy: float
     covariance: np.ndarray
     information: np.ndarray
@@ -96,12 +98,13 @@ class Solved(Displayed):
         D = (V * roots).T @ ((V * roots) / (sigmas * metric(model)[varies])[:, None] ** 2)
         redundancy = int(np.maximum(spare, 0).sum()) - seen.rank + float(np.trace(D))
         if redundancy <= 0:
-            return Noise(np.nan, 1.0, redundancy, seen.covariance, seen.information)
+            return Noise(np.nan, 1.0, False, redundancy, seen.covariance, seen.information)
         excess = float(np.sqrt(max(self.fit.cost - float(((moved / sigmas) ** 2).sum()), 0.0) / redundancy))
         if not seen.rank:
-            return Noise(excess, 1.0, redundancy, seen.covariance, seen.information)
+            return Noise(excess, 1.0, False, redundancy, seen.covariance, seen.information)
         white = np.eye(seen.rank) - D
-        M, more = information_of(model, state, V * roots, white)
+        M, more, lags = information_of(model, state, V * roots, white)
+        lasting = lags > (model.track.smoothed if model.track else 0)
         again = repeating(model, state, V * roots)
         M = M if again is None else again.larger(M, white)
         larger = max(1 / more, excess**2)  # smoothing of poses makes their noise smaller, but autocorrelated
@@ -109,7 +112,8 @@ class Solved(Displayed):
         wide = (turn * np.sqrt(np.maximum(shares, 0.0))) @ turn.T
         M = larger * M + D + out_of_plane(model, state, V * roots)
         spread = roots[:, None] * (wide @ M @ wide) * roots
-        return Noise(excess, more, redundancy, V @ spread @ V.T, V @ np.linalg.inv(spread) @ V.T, again)
+        more *= larger / max(1.0, excess**2)
+        return Noise(excess, more, lasting, redundancy, V @ spread @ V.T, V @ np.linalg.inv(spread) @ V.T, again)
 
 
 def solve(
@@ -282,7 +286,7 @@ def lengths_of(model: Model, state: State) -> np.ndarray:
 
 def inflation_of(noise: Noise) -> float:
     """Return the factor of a covariance without priors, for residuals larger than stated, or autocorrelated."""
-    return max(1.0, float(np.nan_to_num(noise.excess)) ** 2 * noise.autocorrelation)
+    return max(1.0, float(np.nan_to_num(noise.excess)) ** 2) * noise.autocorrelation
 
 
 def covariance_of(solved: Solved) -> np.ndarray:

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...models.part import LARGEST
 from .balance import hangs
 from .considered import from_thrusts, usual_error
 from .fit import held
@@ -89,6 +90,7 @@ def certainty(solved: Solved) -> float:
         return 0.0
     sigmas = np.sqrt(np.diag(covariance_of(solved))[own])
     change = (solved.fit.state.x - of.first)[places]
+    change[np.abs(change) < 1 / LARGEST] = 0.0  # no file has a cable that is so stiff
     return float(((change if elastic else np.abs(change)) / np.maximum(sigmas, 1e-300)).max())
 
 

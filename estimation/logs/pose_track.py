@@ -45,6 +45,8 @@ class PoseTrack:
         values = np.hstack([position[known], quaternions])
         width = neighbours or widest_parabola(measured, values, MOST, moving=True)
         smooth = len(values) >= width
+        # Samples over which noise of the poses is autocorrelated.
+        self.smoothed = width * self._widest / WIDEST / float(np.median(np.diff(times)))
         self._values = (
             Polynomials(measured, width, fading=neighbours is None).values(values[None])[0] if smooth else values
         )

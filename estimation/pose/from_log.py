@@ -24,7 +24,7 @@ from ..logs.encoders import lengths_of
 from ..logs.measurements import Measurements, carriers_of, check_measurements
 from ..logs.recording import COUNTED
 from ..logs.smoothing import FEWEST, Polynomials, within
-from .estimate import FALSE_ALARM, PoseEstimate, largest_cost
+from .estimate import FALSE_ALARM_IN_LOG, PoseEstimate, largest_cost
 from .from_lengths import SIGMA, checked_sigma, pose_from_lengths
 from .wrong_lengths import TOLD_APART, can_explain, wrong_cables
 
@@ -85,10 +85,10 @@ class LogPoses(Displayed):
     def largest(self) -> float:
         """Return the largest `cost` at which a pose fits a sample; nan without redundant cables.
 
-        In a log without wrong readings, the probability that any sample exceeds it is 1 %.
+        In a log without wrong readings, the probability that any sample exceeds it is 0.01 %.
         """
         redundancy = self.estimate.robot.m - int(self.estimate.robot.dof_mask.sum()) + self.more
-        return largest_cost(redundancy, FALSE_ALARM / len(self.estimate.pose)) if redundancy > 0 else np.nan
+        return largest_cost(redundancy, FALSE_ALARM_IN_LOG / len(self.estimate.pose)) if redundancy > 0 else np.nan
 
     @property
     def fits(self) -> np.ndarray:
