@@ -63,7 +63,7 @@ def fit(model: Model, state: State, length: float, steps: int = MOST_STEPS, enou
     varies = model.parameters.varies
     first = model.parameters.first
     damping, back, at_best, equations = _Damping(), 1.0, False, None
-    cost, idle = np.inf, 0
+    cost, ended, idle = np.inf, np.inf, 0
     for done in range(1, steps + 1):
         del equations  # before the next ones need as much memory
         equations = NormalEquations.at(model, state, scale, damping.added)
@@ -96,7 +96,12 @@ def fit(model: Model, state: State, length: float, steps: int = MOST_STEPS, enou
                 continue
         # A step along open directions may cost a little: they are straight lines only nearby.
         if new - cost <= SMALL * (1 + cost) if negligible else new <= cost and size <= FARTHEST * length:
-            # If no more reduction is expected, a step without damping shows whether that is so.
+            # If no more reduction is expected, a step without damping shows whether that is so. At a kink of the sum, as
+            # where a clock offset leaves samples without a pose, derivatives promise a reduction that no step brings.
+            if negligible and damping.factor > 0:
+                if ended - cost <= little:
+                    return Fit(state, cost, True, done)
+                ended = cost
             damping.accept(0.0 if negligible else (cost - new) / expected)
             damping.factor *= not negligible
             state, cost, at_best = tried, new, settles
