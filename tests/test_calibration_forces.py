@@ -536,3 +536,31 @@ def test_thrusts_of_a_carrier_whose_cable_never_pulls_do_not_hide_the_mass():
     log = Measurements(Dynamics(robot).cable_lengths(poses), poses, tensions=np.abs(tensions), carrier_poses=carriers)
     found = calibrate(robot, log, free=("mass",))
     assert 1e-3 < np.sqrt(found.covariance[0, 0]) / robot.platform.mass < 0.05
+
+
+def test_noise_of_accelerations_makes_no_mass_smaller():
+    """With zeros of load cells, only accelerations tell the mass: their noise looked like a mass of 72 kg."""
+    draw, robot, times = np.random.default_rng(1), load("cogiro"), 0.02 * np.arange(500)
+    rates, size = np.array([1.1, 0.7, 0.9, 0.6, 0.8, 0.5]), np.array([1, 0.8, 0.3, 0, 0, 0])
+    swing = np.sin(np.outer(times, rates))
+    poses, dynamics = robot.home + size * swing, Dynamics(robot)
+    A = dynamics.wrench_matrix(poses)  # moments about the CoM
+    pull = np.zeros((len(times), 6, 1))
+    pull[:, :3, 0] = robot.platform.mass * ((-size * rates**2 * swing)[:, :3] - robot.gravity)
+    tensions = 300 + (np.linalg.pinv(A) @ (pull - 300 * A.sum(axis=2, keepdims=True)))[..., 0]
+    assert tensions.min() > 100
+    sigmas = np.repeat([5e-3, 1e-4], 3)
+    log = Measurements(
+        dynamics.cable_lengths(poses) + draw.normal(0, 1e-3, tensions.shape),
+        poses + sigmas * draw.normal(0, 1, poses.shape),
+        times=times,
+        tensions=tensions * (1 + draw.normal(0, 0.005, tensions.shape)),
+        sigma={"lengths": 1e-3, "position": 5e-3, "rotation": 1e-4, "tensions": 0.005},
+    )
+    found = {one.name: one for one in calibrate(robot, log, ("offsets", "mass", "zeros")).parameters}
+    mass = found["mass"]
+    assert mass.sigma < 0.05 * robot.platform.mass
+    assert mass.value == pytest.approx(robot.platform.mass, abs=3 * mass.sigma)
+    zeros = [one for name, one in found.items() if "zero" in name]
+    assert len(zeros) == robot.m
+    assert max(abs(one.value / one.sigma) for one in zeros) < 3

@@ -75,6 +75,7 @@ class _Forces(NamedTuple):
     reduced: np.ndarray | None  # residuals in standard deviations
     pull: np.ndarray
     by_arm: np.ndarray
+    sigma: np.ndarray
 
     @property
     def most_likely(self) -> np.ndarray:
@@ -229,13 +230,14 @@ class Balance:
         r = (A @ tensions[..., None])[..., 0] + wrench
         inner = A[:, rows] * self._scale[:, None]
         M = np.einsum("nim,nm,njm->nij", inner, variances, inner)
-        own = self._log.lasting * (noise * OWN * robot.weight) ** 2 + (robot.platform.mass * motion.sigma) ** 2
-        M[:, np.arange(len(rows)), np.arange(len(rows))] += np.reshape(own, (-1, 1))
+        accelerated = np.where(rows < 3, mass, robot.platform.mass) * motion.sigma[:, None]  # its errors [N], (N, k)
+        own = self._log.lasting * (noise * OWN * robot.weight) ** 2 + accelerated**2
+        M[:, np.arange(len(rows)), np.arange(len(rows))] += own
         finite = np.isfinite(M).all() and np.isfinite(r).all()
         root = np.linalg.inv(np.linalg.cholesky(M)) if finite else None
         reduced = None if root is None else (root @ (r[:, rows] * self._scale)[..., None])[..., 0]
         felt = record, poses, tensions, by_tensions
-        return _Forces(*felt, A, r, inner, variances, root, reduced, pull, motion.by_arm)
+        return _Forces(*felt, A, r, inner, variances, root, reduced, pull, motion.by_arm, motion.sigma)
 
     def masses(
         self, of: Parameters, x: np.ndarray, placed: tuple[np.ndarray, np.ndarray], clock: float
@@ -325,7 +327,12 @@ class Balance:
         carried = np.zeros((count, m, 6))
         behind = np.swapaxes(of_log.inner, 1, 2) @ np.swapaxes(inverse_root, 1, 2)
         carried[..., rows] = -gain * of_log.variances[..., None] * behind
-        return Balanced(residuals, reduce(raw), reduce(by_pose), carried)
+        by_parameters = reduce(raw)
+        # Errors of accelerations grow with the mass. Without their part, a smaller mass would make them smaller.
+        of_forces = np.swapaxes(inverse_root[..., rows < 3], 1, 2)
+        growing = mass * np.square(of_log.sigma)[:, None, None] * (of_forces @ residuals[:, rows, None])
+        by_parameters[:, rows, of.clock + 1] -= (np.swapaxes(of_forces, 1, 2) @ growing)[..., 0]
+        return Balanced(residuals, by_parameters, reduce(by_pose), carried)
 
 
 def hangs(robot: Robot, measurements: Measurements) -> bool:
