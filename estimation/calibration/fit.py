@@ -96,8 +96,8 @@ def fit(model: Model, state: State, length: float, steps: int = MOST_STEPS, enou
                 continue
         # A step along open directions may cost a little: they are straight lines only nearby.
         if new - cost <= SMALL * (1 + cost) if negligible else new <= cost and size <= FARTHEST * length:
-            # If no more reduction is expected, a step without damping shows whether that is so. At a kink of the sum, as
-            # where a clock offset leaves samples without a pose, derivatives promise a reduction that no step brings.
+            # If no more reduction is expected, a step without damping shows whether that is so. At a kink of the sum,
+            # as where a clock offset leaves samples without a pose, it promises a reduction that no step brings.
             if negligible and damping.factor > 0:
                 if ended - cost <= little:
                     return Fit(state, cost, True, done)
@@ -172,15 +172,18 @@ def settled(model: Model, state: State, negligible: float) -> State:
 
     It ends where the decrease of each sample's sum of squares is negligible.
     """
-    share = np.ones(len(state.shift))
+    rows = np.arange(len(state.shift))  # of poses that move
+    share, part, found = np.ones(len(rows)), model, State(state.x, *(one.copy() for one in state[1:]))
     for _ in range(MOST_POSE_STEPS):
-        dq, expected, before = pose_steps(model, state)
-        moves = expected > negligible
-        if not moves.any():
+        dq, expected, before = pose_steps(part, found.only(rows))
+        moves = np.flatnonzero(expected > negligible)
+        if not moves.size:
             break
-        tried = model.moved(state, np.zeros_like(state.x), np.where(moves, share, 0.0)[:, None] * dq)
-        after = model.residuals(tried).of_samples
-        better = after <= before
+        if len(moves) < len(rows):
+            rows, share, part, dq, before = rows[moves], share[moves], part.part(moves), dq[moves], before[moves]
+        tried = part.moved(found.only(rows), np.zeros_like(state.x), share[:, None] * dq)
+        better = part.residuals(tried).of_samples <= before
         share = np.where(better, 1.0, SHORTER * share)
-        state = State(state.x, *(np.where(better, a.T, b.T).T for a, b in zip(tried[1:], state[1:], strict=True)))
-    return state
+        for whole, own in zip(found[1:], tried[1:], strict=True):
+            whole[rows[better]] = own[better]
+    return found

@@ -148,14 +148,17 @@ class Model(Displayed):
         if count <= PART:
             yield slice(None), self, state
             return
-        shared = ("size_is_open", "pulled_at_poses", "prior_sigmas", "kept_rows", "_in_plane")
-        known = {name: getattr(self, name) for name in shared}
         for first in sorted(range(0, count, PART), reverse=backwards):
-            part = self.only(rows := slice(first, first + PART))
-            balanced = None if self.balanced is None else part.forces
-            # Which poses are known anywhere says how all samples count.
-            vars(part).update(known, pose_sigmas=self.pose_sigmas[rows], balanced=balanced)
-            yield rows, part, State(state.x, *(one[rows] for one in state[1:]))
+            rows = slice(first, first + PART)
+            yield rows, self.part(rows), state.only(rows)
+
+    def part(self, rows: np.ndarray | slice) -> Model:
+        """Return the model of some samples (k,) that rise, which count as they do in the whole log."""
+        shared = ("size_is_open", "pulled_at_poses", "prior_sigmas", "kept_rows", "_in_plane")
+        part, known = self.only(rows), {name: getattr(self, name) for name in shared}
+        balanced = None if self.balanced is None else part.forces
+        vars(part).update(known, pose_sigmas=self.pose_sigmas[rows], balanced=balanced)
+        return part
 
     @cached_property
     def felt_tensions(self) -> FeltTensions | None:

@@ -141,8 +141,7 @@ def robust(model: Model, state: State, length: float, rough: float = np.inf) -> 
         return _robust(model, state, length, rough)[:2]
     rows = np.linspace(0, count - 1, MOST_SAMPLES).astype(int)
     part = model.only(rows)
-    begin = State(state.x, *(one[rows] for one in state[1:]))
-    found, _, least = _robust(part, fit(part, begin, length).state, length, rough)
+    found, _, least = _robust(part, fit(part, state.only(rows), length).state, length, rough)
     at = state._replace(x=found.x)
     at = settled(model, at, SETTLED) if model.poses_vary.any() else at
     left = project(model, at)

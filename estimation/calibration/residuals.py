@@ -25,6 +25,10 @@ class State(NamedTuple):
     turn: np.ndarray
     errors: np.ndarray
 
+    def only(self, rows: np.ndarray | slice) -> State:
+        """Return the state of some samples (k,)."""
+        return State(self.x, *(one[rows] for one in self[1:]))
+
 
 class Residuals(NamedTuple):
     """Differences over their standard deviations.
