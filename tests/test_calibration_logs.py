@@ -153,7 +153,7 @@ FAULTS = {
     "twice": "must have each column once, got l1 twice",
     "a name of another kind": "must have lengths under names of one kind, got l0, l1, l2, l3, l4, l5, l6 and length8",
     "a gap": "must have columns l0 to l7 without a gap, got no l2",
-    "nan": "l3 must be a finite number at sample 0, got nan",
+    "nan": "l3 must be a finite number at sample 0, got nan; [0-9]+ of [0-9]+ samples are incomplete",
     "times": "times must increase from sample to sample, got 9.5 s and then 9 s at sample 20; "
     "cut the log where its clock was set back",
     "no lengths": "must have columns l0, l1, ... of lengths, got x, y, z, roll, pitch, yaw",

@@ -381,7 +381,7 @@ class CalibrationData(Displayed):
             "hint": None if self.mistake is None or self.mistake.severe else self.mistake.text,
             "beyond_prior": [{"name": name, "sigmas": sigmas} for name, sigmas in self.beyond_prior],
             "free": list(self.free),
-            "samples": len(self._solved.model.measurements),
+            "samples_used": len(self._solved.model.measurements),
             "residual_before": self.residual_before,
             "residual_after": self.residual_after,
             "noise": self.noise,

@@ -27,11 +27,10 @@ from .north_east_down import FROM_FRD, FROM_NED, carriers_from_ned, ned_frame, n
 from .opening import recordings
 from .pose_track import PoseTrack, unit_quaternions
 from .recording import COUNTED, Recording, Samples
-from .streams import Reader, at_times, interpolated, like_time
+from .streams import Reader, at_times, complete_samples, interpolated, like_time
 from .thrust_gains import notes_of_tilts
 
 Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
-MOST_PARTIAL = 0.2  # of the samples, of which some but not all cables were measured
 UNSURE = 0.1  # [s] sigma of clocks of carriers, which a calibration finds more exactly
 AHRS = np.radians(0.5)  # sigma of orientations that no motion capture measured
 
@@ -309,7 +308,7 @@ def measurements_of(
         if tensions.times is not None:
             tensions = Samples(tensions.times[good], tensions.values[good])
         tensions = at_times(lengths.times, tensions, found.tensions[0])
-    kept = _kept(lengths.values, found.lengths) & _kept(tensions.values, found.tensions)
+    kept = complete_samples(lengths.values, found.lengths) & complete_samples(tensions.values, found.tensions)
     if not kept.all():
         notes.append(f"samples skipped because lengths or tensions are missing: {quantity(int((~kept).sum()))}")
     rows = slice(None) if kept.all() else kept  # a copy of a long log takes much memory
@@ -382,19 +381,3 @@ def of_two_sensors(lengths: np.ndarray, poses: np.ndarray) -> bool:
     """Return whether a table has separate lines for lengths (N, m) and for poses (N, k), with nan elsewhere."""
     complete, known = (np.isfinite(values).all(axis=1) for values in (lengths, poses))
     return bool((complete & known).sum() < 0.5 * min(complete.sum(), known.sum()))
-
-
-def are_too_partial(finite: np.ndarray) -> bool:
-    """Return whether no sample is complete, or too many have only some of their numbers; `finite` is (N, m) of bool."""
-    kept = finite.all(axis=1)
-    return not kept.any() or bool((finite.any(axis=1) & ~kept).mean() > MOST_PARTIAL)
-
-
-def _kept(values: np.ndarray, fields: Sequence[Field]) -> np.ndarray:
-    """Return the samples that are complete, (N,) of bool; raise InputError if too many have gaps."""
-    finite = np.isfinite(values)
-    kept = finite.all(axis=1)
-    if are_too_partial(finite):
-        row, column = (int(i) for i in np.argwhere(~finite)[0])
-        raise InputError(f"{fields[column].full} must be a finite number at sample {row}, got {values[row, column]:g}")
-    return np.asarray(kept)

@@ -15,6 +15,7 @@ from .recording import GAP, Samples, Topic, check_rising, plain
 MOST_REPEATED = 0.2  # of the samples of a table, that may repeat a time
 FEWEST, STEADY = 20, 5.0  # samples, and how many times the usual step the longest one of a time may be
 DAY = 86400.0  # [s]
+MOST_PARTIAL = 0.2  # of the samples, of which some but not all cables were measured
 MUCH_FASTER = 8  # times the rate, from which lines between samples suffice
 
 
@@ -131,3 +132,23 @@ def interpolated(times: np.ndarray, samples: Samples) -> np.ndarray:
     outside = (own[after] - own[after - 1] > GAP * apart) | (times < own[0]) | (times > own[-1])
     result[outside] = np.nan
     return result
+
+
+def are_too_partial(finite: np.ndarray) -> bool:
+    """Return whether no sample is complete, or too many have only some of their numbers; `finite` is (N, m) of bool."""
+    kept = finite.all(axis=1)
+    return not kept.any() or bool((finite.any(axis=1) & ~kept).mean() > MOST_PARTIAL)
+
+
+def complete_samples(values: np.ndarray, fields: Sequence[Field]) -> np.ndarray:
+    """Return the samples that are complete, (N,) of bool; raise InputError if too many have gaps."""
+    finite = np.isfinite(values)
+    kept = finite.all(axis=1)
+    if are_too_partial(finite):
+        row, column = (int(i) for i in np.argwhere(~finite)[0])
+        raise InputError(
+            f"{fields[column].full} must be a finite number at sample {row}, got {values[row, column]:g}; "
+            f"{quantity(int((~kept).sum()))} of {quantity(len(kept))} samples are incomplete, and at most "
+            f"{quantity(100 * MOST_PARTIAL)} % may have only some of their numbers"
+        )
+    return np.asarray(kept)
