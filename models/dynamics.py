@@ -87,6 +87,15 @@ class Dynamics(Displayed):
         return self._line("length_jacobian", pose, carrier_pose)
 
     @one_array
+    def cable_wrench(self, pose: Array, tensions: Array, carrier_pose: Array | None = None) -> Array:
+        """Return the wrench A t of the cables: force [N] and moment about the CoM [N m], in {G}, (..., 6).
+
+        Arguments as in `wrench_jacobian`. As an expression it has fewer operations than A t, and so have its
+        derivatives.
+        """
+        return self._call("cable_wrench", pose=pose, tensions=tensions, carrier_pose=carrier_pose)["W"]
+
+    @one_array
     def wrench_jacobian(self, pose: Array, tensions: Array, carrier_pose: Array | None = None) -> Array:
         """Return the derivative of A t with respect to the pose at constant tensions, (..., 6, 6).
 

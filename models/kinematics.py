@@ -56,3 +56,22 @@ def wrench_matrix(robot: Robot, pose: Matrix, directions: Matrix) -> Matrix:
     """Return A, (6, m): force [N per N] and moment about the CoM [N m per N] of each cable, in the frame of `pose`."""
     arms = rotation(pose[3:6]) @ ca.DM((robot.attachments - np.array(robot.platform.com)).T)  # (3, m)
     return ca.vertcat(directions, ca.cross(arms, directions, 1))
+
+
+def cable_wrench(robot: Robot, pose: Matrix, run: Exit, tensions: Matrix) -> Matrix:
+    """Return A t, (6, 1), for tensions t (m, 1) [N]: force [N] and moment about the CoM [N m].
+
+    Each tension is over its cable's length before its moment is taken: second derivatives then take 0.7 of the
+    operations of those of A t.
+    """
+    R, com = rotation(pose[3:6]), np.array(robot.platform.com)
+    arms = R @ ca.DM((robot.attachments - com).T)  # (3, m)
+    spans = run.points - (pose[0:3] + R @ ca.DM(com)) - arms
+    lengths = ca.sqrt(ca.sum1(spans**2))
+    forces = ca.horzcat(
+        *(
+            run.directions[:, i] * tensions[i] if radius else spans[:, i] * (tensions[i] / lengths[i])
+            for i, radius in enumerate(robot.pulley_radii)
+        )
+    )
+    return ca.vertcat(ca.sum2(forces), ca.sum2(ca.cross(arms, forces, 1)))

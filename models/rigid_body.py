@@ -77,11 +77,11 @@ def body_wrench(
     acceleration: Matrix,
 ) -> Matrix:
     """Return the wrench, (6, 1), that a body needs about its CoM, which like its inertia is given in a moving frame."""
-    R, Omega, alpha_b = turning(pose, velocity, acceleration)
-    omega, alpha, offset = R @ Omega, R @ alpha_b, R @ com
-    a_com = acceleration[0:3] + ca.cross(alpha, offset) + ca.cross(omega, ca.cross(omega, offset))
-    turned = R @ inertia @ R.T
-    return ca.vertcat(mass * (a_com - gravity), turned @ alpha + ca.cross(omega, turned @ omega))
+    R, Omega, alpha = turning(pose, velocity, acceleration)
+    # In the body's own frame, whose inertia is constant: in {G} second derivatives take twice the operations.
+    of_com = ca.cross(alpha, com) + ca.cross(Omega, ca.cross(Omega, com))
+    moment = inertia @ alpha + ca.cross(Omega, inertia @ Omega)
+    return ca.vertcat(mass * (acceleration[0:3] + R @ of_com - gravity), R @ moment)
 
 
 def aerodynamic_wrench(robot: Robot, pose: Matrix, velocity: Matrix, wind: Matrix) -> Matrix:

@@ -75,9 +75,9 @@ class WorldFunctions:
         pose, tensions = self._symbols["pose"], self._symbols["tensions"]
         return elasticity.tension_stiffness(self._robot, pose, self._anchors, self._axes, tensions)
 
-    @property
+    @cached_property
     def _pull(self) -> Matrix:
-        return self._A @ self._symbols["tensions"]
+        return kinematics.cable_wrench(self._robot, self._symbols["pose"], self._exit, self._symbols["tensions"])
 
     def _acceleration(self, wrench: Matrix) -> Matrix:
         return rigid_body.platform_acceleration(self._robot, self._symbols["pose"], self._symbols["velocity"], wrench)
@@ -118,6 +118,7 @@ _DEFINITIONS: dict[str, tuple[str, Callable[[WorldFunctions], dict[str, Matrix]]
     "wrench_matrix": (_PLACE, lambda of: {"A": of._A}),  # (6, m)
     "cable_lengths": (_PLACE, lambda of: {"lengths": of._exit.lengths}),  # (m, 1)
     "length_jacobian": (_PLACE, lambda of: {"J": _slopes(of._exit.lengths, of)}),  # (m, 6)
+    "cable_wrench": (_PULLED, lambda of: {"W": of._pull}),  # (6, 1)
     "wrench_jacobian": (_PULLED, lambda of: {"D": _slopes(of._pull, of)}),  # (6, 6)
     "points": (_PLACE, WorldFunctions._points),  # (m, 3) each
     "exits": (_PLACE, lambda of: {"exits": of._exit.points.T}),  # (m, 3)

@@ -120,7 +120,7 @@ def symbolic(robot, name, pose, carriers, *others):
     return [np.array([row[i].full() for row in rows]) for i in range(function.n_out())]
 
 
-def test_points_and_derivatives_of_wrenches_are_those_of_the_symbolic_model(robot):
+def test_points_wrenches_and_their_derivatives_are_those_of_the_symbolic_model(robot):
     rng = np.random.default_rng(5)
     pose, _, _, carriers = motions(robot, rng)
     pose, carriers, dynamics = pose[::3], carriers[::3], Dynamics(robot)
@@ -129,6 +129,7 @@ def test_points_and_derivatives_of_wrenches_are_those_of_the_symbolic_model(robo
     for got, want in zip(dynamics.points(pose, carriers), symbolic(robot, "points", pose, carriers), strict=True):
         np.testing.assert_allclose(got, want, rtol=0, atol=1e-14 * size)
     for name, got in {
+        "cable_wrench": dynamics.wrench_matrix(pose, carriers) @ tensions[..., None],
         "wrench_jacobian": dynamics.wrench_jacobian(pose, tensions, carriers),
         "tension_stiffness": dynamics.stiffness(pose, tensions, carriers, elastic=False),
     }.items():

@@ -76,6 +76,6 @@ def _exit(anchor: Matrix, axis: Matrix, attachment: Matrix, radius: float) -> Ex
     s = ca.sqrt(distance**2 - 2 * distance * radius + up**2)  # D^2 - r^2, without the cancellation of r^2
     # d = r n + s t with n = (C - M) / r and t a quarter turn from it: solved for both
     n = ((radius * out - s * up) * e + (radius * up + s * out) * axis) / D_squared
-    t = ((s * out + radius * up) * e + (s * up - radius * out) * axis) / D_squared
+    t = (s * out + radius * up) / (D_squared * distance) * across + (s * up - radius * out) / D_squared * axis
     wrap = np.pi - ca.atan2(s, radius) - ca.atan2(up, out)
     return Exit(anchor + radius * (e + n), -t, radius * wrap + s, wrap)

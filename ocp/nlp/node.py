@@ -56,7 +56,10 @@ def node_of(
         w -= columns @ (robot.force_scale * x[layout.supports])
     scale = robot.force_scale / robot.wrench_scale
     moving = [int(row) for row in np.flatnonzero(robot.dof_mask)]
-    balance = ((A @ tensions - w) / ca.DM(scale))[moving]
+    # Where A has other tensions too, its derivatives are shared.
+    alone = not (scenario.relative or layout.winds)
+    pulled = dynamics.cable_wrench(platform[0], tensions, pose_rows[0]) if alone else A @ tensions
+    balance = ((pulled - w) / ca.DM(scale))[moving]
     balances = [balance]
     for i, less in enumerate(_decisive(scenario, load, bodies[0])):
         start = layout.wind_tensions.start + i * robot.m
