@@ -136,7 +136,8 @@ class Planner(Displayed):
             self._chosen = chosen or self._chosen
             self.scenario = with_its_reference(start, self.scenario)
         self._search = search = Search(self.scenario, self._solvers, progress)
-        search.stages += [chosen.stage] if chosen else []
+        if chosen is not None:
+            search.stages, search.known = [chosen.stage], chosen.audit
         with heeding():
             guess = None if start is None else deviation_from(self.scenario, start)
             plan = replace(climb(search, guess, self._last), stages=tuple(search.stages))
@@ -160,7 +161,9 @@ class Planner(Displayed):
         """Plan another scenario in the remaining time of the first search; `timing` is the timing of the same path."""
         scenario, chosen = shortest_durations(scenario)
         self._search = search = Search(scenario, {}, first.progress, first.seconds_left, timing=timing)
-        search.stages += [chosen.stage] if chosen else []
+        search.built = first.built
+        if chosen is not None:
+            search.stages, search.known = [chosen.stage], chosen.audit
         plan = replace(climb(search, start, None), stages=tuple(search.stages))
         return plan if chosen is None else chosen.judged(plan)
 

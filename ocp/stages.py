@@ -29,7 +29,7 @@ from .search.homotopy import from_easier
 from .search.reference import about_better_reference
 from .search.refinement import refine
 from .search.search import Search
-from .search.time_law import BOUND
+from .search.time_law import BOUND, audit_of_law
 from .tasks.deviation import Deviation
 from .tasks.ends import between_fixed_values
 from .tasks.status import MotionStatus
@@ -66,7 +66,7 @@ def _fixed_motion(search: Search) -> Plan:
     limit, it also searches for cheaper ones.
     """
     start = time.perf_counter()
-    audit = search.audit_motion(search.scenario, None)
+    audit = search.audit_motion(search.scenario, None, known=search.known)
     spent = time.perf_counter() - start
     status, reason = MotionStatus.FEASIBLE if audit.passed else MotionStatus.INFEASIBLE, ""
     if not audit.passed and other_tensions_may_pass(search.scenario, audit):
@@ -137,7 +137,8 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
         return None, own
     if fast.feasible and span.min <= fast.duration <= span.max:
         chosen = scenario.along(fast.law.path, fast.duration)
-        audit = search.audit_motion(chosen, None, "audit with the fastest time law")
+        known = audit_of_law(fast, scenario)
+        audit = search.audit_motion(chosen, None, "audit with the fastest time law", known)
         return (Plan(chosen, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0) if audit.passed else None), own
     too_slow = fast.feasible and BOUND * fast.duration > span.max
     if own or not (too_slow or fast.law.certificate is not None):

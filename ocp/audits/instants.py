@@ -90,8 +90,12 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
     if not scenario.phases.rest:
         chosen = within_motors(scenario, times, distribute.scaled_A, cases[0], bounded)
         if chosen is not result.tensions:
+            changed = (chosen != result.tensions).any(axis=1)
             result = result._replace(tensions=chosen)
-            bounded = scenario.limits.along(motion, carriers, chosen, off_path, distances=False)
+            moved, bases = (Motion(*(part[changed] for part in each)) for each in (motion, carriers))
+            again = scenario.limits.along(moved, bases, chosen[changed], off_path[changed], distances=False)
+            for its, other in zip(bounded, again, strict=True):
+                its[changed] = other
     return Instants(
         scenario=scenario,
         deviation=deviation,

@@ -48,7 +48,9 @@ class Stages(Displayed):
         layout, grid, thin = Layout.of(scenario, mesh.elastic), Grid.of(scenario, mesh.steps), swept(scenario, mesh)
         # The unknowns of a smooth scheme are in units of an interval's length.
         unit = (scenario.duration, mesh.steps) if scenario.scheme.smooth else ()
-        same = id(scenario.task), id(scenario.limits), id(scenario.tightened), *map(id, thin)
+        # The layout says whether the duration is an unknown; which ones are allowed is a matter of bounds.
+        alike = scenario.task.model_copy(update={"duration": None})
+        same = layout, alike, id(scenario.limits), id(scenario.tightened), *map(id, thin)
         key = *same, scenario.passing, mesh.elastic, mesh.between, *unit
         times = grid.shares * scenario.duration
         numbers = reference_motions(scenario, times), _carried(scenario, times)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from ...base.errors import InputError
 from ...base.text import quantity
 from ...models.part import PositiveRange
-from ..audits.audit import audit
+from ..audits.audit import Audit, audit
 from ..audits.violation import relative_violation
 from ..plan import Plan
 from ..proofs.durations import Durations, durations
@@ -24,17 +24,18 @@ from ..tasks.paths import SequencePath
 from ..tasks.scenario import AUDIT_RATE, Scenario
 from ..tasks.status import MotionStatus
 from ..tasks.task import Task
-from .time_law import BOUND, fastest
+from .time_law import BOUND, audit_of_law, fastest
 
 LEAST = LEAST_INSTANTS / AUDIT_RATE  # [s], that a phase may last
 CLOSE = 1e-3  # relative: from the shortest duration that is feasible
 
 
 class Chosen(NamedTuple):
-    """The stage that chose durations, and what it proves."""
+    """The stage that chose durations, what it proves, and the audit of the motion with them, if it has one."""
 
     stage: PlannerStep
     proven: bool = True  # whether no motion is feasible if the one with these durations is not
+    audit: Audit | None = None
 
     def judged(self, plan: Plan) -> Plan:
         """Return a plan with these durations, not-found instead of infeasible if they prove nothing."""
@@ -67,16 +68,19 @@ def _with_dwell(scenario: Scenario, span: PositiveRange) -> tuple[Scenario, Chos
         stage = PlannerStep("duration with its dwells", proof.describe(), time.perf_counter() - start)
         return scenario.held(span.max), Chosen(stage)
     law, message = fastest(scenario)
-    chosen = None
+    chosen, audited = None, None
     if law is not None and law.law is not None and law.feasible and span.min <= law.duration <= span.max:
         timed = lay_out(scenario.robot, task.model_copy(update={"path": law.law.path, "duration": None}))
-        chosen = timed if audit(timed, None).passed else None
+        audited = audit_of_law(law, scenario) or audit(timed, None)
+        chosen = timed if audited.passed else None
     if chosen is None:
+        audited = None
         seconds = _shortest(span, scenario.path.resting, lambda seconds: _beyond(scenario.held(seconds)))
         chosen, message = scenario.held(seconds), f"{quantity(seconds, 's')} with the task's time law"
     too_slow = law is not None and law.feasible and BOUND * law.duration > span.max
     proven = too_slow or (law is not None and law.law is not None and law.law.certificate is not None)
-    return chosen, Chosen(PlannerStep("duration with its dwells", message, time.perf_counter() - start), proven)
+    stage = PlannerStep("duration with its dwells", message, time.perf_counter() - start)
+    return chosen, Chosen(stage, proven, audited)
 
 
 def _shortest_phases(scenario: Scenario) -> tuple[Scenario, Chosen | None]:

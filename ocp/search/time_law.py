@@ -9,6 +9,7 @@ from functools import cached_property
 
 from ...base.errors import InputError, SolverError
 from ...base.text import quantity
+from ..audits.audit import Audit
 from ..plan import Plan
 from ..proofs.durations import Durations, durations
 from ..tasks.paths import LinePath, RestPath, WaypointPath
@@ -63,3 +64,9 @@ def fastest(scenario: Scenario) -> tuple[Plan | None, str]:
         return found, f"the fastest time law takes {quantity(found.duration, 's', 6)}"
     at = 0.0 if found.law is None else found.law.at or 0.0
     return found, f"{found.status.value} at {quantity(100 * at, '%', 3)} of the path"
+
+
+def audit_of_law(law: Plan, scenario: Scenario) -> Audit | None:
+    """Return the audit of the fastest law if it is one of all limits of the scenario, else None."""
+    task = scenario.task.model_copy(update={"path": law.scenario.task.path, "duration": None})
+    return law.audit if task == law.scenario.task else None
