@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...base.text import quantity
+from ...models.points import rotation_vectors, rotations
 from ..tasks.paths import Stations
 
 LOOKS = 41  # about the instant that is nearest to a waypoint
@@ -57,11 +58,10 @@ def waypoint_distance(
     """
     if not stations.names:
         return None
-    from scipy.spatial.transform import Rotation
 
     def off(seen: np.ndarray, station: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        turned = Rotation.from_euler("ZYX", station[..., 5:2:-1]).inv() * Rotation.from_euler("ZYX", seen[:, 5:2:-1])
-        return seen[:, :3] - station[..., :3], turned.as_rotvec()
+        turned = rotations(station[..., 3:]).swapaxes(-1, -2) @ rotations(seen[:, 3:])
+        return seen[:, :3] - station[..., :3], rotation_vectors(turned)
 
     after, before = stations.windows
     first = np.maximum(np.searchsorted(times, after, side="right") - 1, 0)

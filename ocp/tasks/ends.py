@@ -7,6 +7,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from ...models import Robot
+from . import bernstein
 from .deviation import Deviation
 from .paths import AnyPath, LinePath, RestPath, SequencePath, WaypointPath
 from .scenario import POSITION, Scenario
@@ -86,15 +87,20 @@ def between_fixed_values(scenario: Scenario) -> Deviation | None:
     fixed = [value for value in fixed_values(scenario) if abs(value.value) > AT_REST]
     if not fixed:
         return None
-    from scipy.interpolate import BPoly  # loads for longer than most proofs take, which do not need it
-
-    ends = np.zeros((scenario.count, 2, 3))
+    ends = np.zeros((2, 3, scenario.count))
     for end, column, order, value in fixed:
-        ends[column, end, order] = value
-    nodes = np.linspace(0.0, scenario.duration, scenario.task.steps + 1)
-    curves = [BPoly.from_derivatives([0.0, scenario.duration], list(column)) for column in ends]
-    q, v, a = (np.stack([curve(nodes, order) for curve in curves], axis=1) for order in range(3))
+        ends[end, order, column] = value
+    lasts, nodes = scenario.duration, np.linspace(0.0, scenario.duration, scenario.task.steps + 1)
+    points = [*_from_end(lasts, *ends[0]), *reversed(_from_end(-lasts, *ends[1]))]
+    speeds = bernstein.derivative(lasts, points)
+    each = points, speeds, bernstein.derivative(lasts, speeds)
+    q, v, a = (bernstein.basis(len(its) - 1, nodes / lasts) @ np.stack(its) for its in each)
     return Deviation(nodes, q, v, a, np.zeros((len(nodes), scenario.robot.m)))
+
+
+def _from_end(h: float, value: np.ndarray, speed: np.ndarray, acceleration: np.ndarray) -> list[np.ndarray]:
+    """Return the three Bernstein points of a quintic polynomial next to an end, h seconds from the other one."""
+    return [value, value + h / 5 * speed, value + 2 * h / 5 * speed + h**2 / 20 * acceleration]
 
 
 def at_rest_without_acceleration(robot: Robot, owner: int | None, coordinate: int) -> bool:
