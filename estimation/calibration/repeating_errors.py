@@ -77,7 +77,7 @@ def repeating(model: Model, state: State, root: np.ndarray) -> Repeating | None:
         np.add.at(sums[..., 3 : 3 + r], own, found.X)
         np.add.at(sums[..., 3 + r :], own, kept * found.X)
     sums = sums.reshape(-1, 3 + 2 * r)
-    used = sums[:, 1] > 0
+    used = sums[:, 1] > ROUNDING  # roots of matrices leave as much of readings that are left out
     weight = np.sqrt(sums[used, 1:2])  # of a sum of independent errors
     y, size, J, S = np.split(np.delete(sums[used], 1, axis=1), [1, 2, 2 + r], axis=1)
     y, size, J = y / weight, size / weight, J / weight
