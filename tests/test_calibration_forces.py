@@ -1,6 +1,7 @@
 """Calibration by the balance of forces, against platforms at rest and in motion that plain NumPy computes."""
 
 import json
+from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 
@@ -17,6 +18,7 @@ from towline.estimation.calibration import representative as module
 from towline.estimation.calibration.autocorrelation import information_of
 from towline.estimation.calibration.balance import FeltTensions
 from towline.estimation.calibration.fit import fit
+from towline.estimation.calibration.hanging import carrying
 from towline.estimation.calibration.model import Model
 from towline.estimation.calibration.motion import motion_of
 from towline.estimation.calibration.normal_equations import NormalEquations
@@ -350,6 +352,47 @@ def test_gradients_are_slopes_of_the_cost(name):
     of_pose += np.einsum("nic,ni->nc", derivatives.balance.by_pose, residuals.balance)
     for axis in np.flatnonzero([*robot.dof_mask, 1, 1]):
         move = 1e-6 * np.outer(np.ones(count), np.eye(8)[axis])
+        more, less = (model.residuals(model.moved(state, 0 * state.x, sign * move)) for sign in (1, -1))
+        slope = (more.balance**2).sum(axis=1) + (more.readings**2).sum(axis=0)
+        slope -= (less.balance**2).sum(axis=1) + (less.readings**2).sum(axis=0)
+        np.testing.assert_allclose(slope / 4e-6, of_pose[:, axis], rtol=1e-3, atol=1e-5 * abs(of_pose).max())
+
+
+@pytest.mark.parametrize("groups", [("anchors", "attachments", "elasticity", "com"), ("offsets", "mass", "com")])
+def test_gradients_of_a_hanging_platform_include_those_of_its_tensions(groups):
+    """Every cable's tension depends on the ends of all cables, the CoM and the pose, so each reading does, too."""
+    draw, t = np.random.default_rng(0), 0.05 * np.arange(60)
+    poses = np.array([0, 0, 1.4, 0, 0, 0]) + 0.1 * np.sin(np.outer(t, draw.uniform(1, 2, 6)) + draw.uniform(0, 6, 6))
+    lengths = np.array([lines(pose)[2] for pose in poses])
+    robot = robot_file(ANCHORS, ATTACHMENTS, COM, MASS, [0, 0, 1.4, 0, 0, 0], stiffness=2e4)
+    sigma = {"lengths": 1e-2, "position": 1e-2, "rotation": 1e-2}
+    log = Measurements(lengths + draw.normal(0, 0.05, lengths.shape), poses, times=t, sigma=sigma)
+    model = Model(Parameters(robot, groups), log, {}, np.ones((4, 60)))
+    state = model.begin()
+    model = replace(model, forces=model._forces)
+    model = replace(model, felt=carrying(model, state, True))
+    assert model.felt.errors.shape == (60, 4, 6)
+    state = model.begin()._replace(errors=draw.normal(size=(60, 6)))
+    residuals, derivatives = model.linearised(state)
+    varies = model.parameters.varies
+    exact = np.einsum("nip,ni->p", derivatives.balance.by_parameters, residuals.balance)
+    exact += np.einsum("mnp,mn->p", derivatives.through, residuals.readings)
+    exact[model.parameters.clock :][varies[model.parameters.clock :]] += np.einsum(
+        "mn,mnk->k", residuals.readings, derivatives.others
+    )
+    for i in range(4):
+        exact[i * OF_CABLE : (i + 1) * OF_CABLE] += residuals.readings[i] @ derivatives.cables[i]
+    small = model.parameters.clock + COMMON
+    for column in np.flatnonzero(varies):
+        step = 1e-6 * np.eye(len(state.x))[column] * (1e-6 if column == small else 1.0)
+        more, less = (model.cost(state._replace(x=state.x + sign * step)) for sign in (1, -1))
+        assert (more - less) / (4 * step.max()) == pytest.approx(
+            exact[column], rel=1e-3, abs=1e-6 * abs(exact[:small]).max()
+        )
+    of_pose = np.einsum("mnc,mn->nc", derivatives.poses, residuals.readings)
+    of_pose += np.einsum("nic,ni->nc", derivatives.balance.by_pose, residuals.balance)
+    for axis in range(12):
+        move = 1e-6 * np.outer(np.ones(60), np.eye(12)[axis])
         more, less = (model.residuals(model.moved(state, 0 * state.x, sign * move)) for sign in (1, -1))
         slope = (more.balance**2).sum(axis=1) + (more.readings**2).sum(axis=0)
         slope -= (less.balance**2).sum(axis=1) + (less.readings**2).sum(axis=0)

@@ -39,14 +39,15 @@ MOST_CAPSTAN = 30.0  # of which exp is no overflow
 class Balanced(NamedTuple):
     """Residuals (N, 6), and their derivatives by parameters (N, 6, P) and by shift and rotation (N, 6, 6), if wanted.
 
-    Coordinates that are locked have zeros. The most likely tensions change by `carried` (N, m, 6) [N] times the
-    residuals.
+    Coordinates that are locked have zeros. `tensions` are the most likely ones (N, m) [N], with derivatives if wanted.
     """
 
     residuals: np.ndarray
     by_parameters: np.ndarray | None = None
     by_pose: np.ndarray | None = None
-    carried: np.ndarray | None = None
+    tensions: np.ndarray | None = None
+    tensions_by_parameters: np.ndarray | None = None  # (N, m, P)
+    tensions_by_pose: np.ndarray | None = None  # (N, m, 6)
 
 
 class FeltTensions(NamedTuple):
@@ -229,7 +230,7 @@ class Balance:
         wrench = np.concatenate([force, np.cross(arm, force) - motion.turning], axis=1)
         r = (A @ tensions[..., None])[..., 0] + wrench
         inner = A[:, rows] * self._scale[:, None]
-        M = np.einsum("nim,nm,njm->nij", inner, variances, inner)
+        M = (inner * variances[:, None]) @ np.swapaxes(inner, 1, 2)
         accelerated = np.where(rows < 3, mass, robot.platform.mass) * motion.sigma[:, None]  # its errors [N], (N, k)
         own = self._log.lasting * (noise * OWN * robot.weight) ** 2 + accelerated**2
         M[:, np.arange(len(rows)), np.arange(len(rows))] += own
@@ -254,9 +255,23 @@ class Balance:
 
     def carrying(
         self, of: Parameters, x: np.ndarray, placed: tuple[np.ndarray, np.ndarray], clock: float
-    ) -> np.ndarray:
-        """Return the tensions by weight and inertia of a platform that `hangs` [N], (N, m). Arguments as for `at`."""
-        return self._forces(of, x, placed, clock, 1.0).most_likely
+    ) -> FeltTensions:
+        """Return the tensions by weight and inertia of a platform that `hangs`. Arguments as for `at`.
+
+        Errors of accelerations, which those of poses cause, would make cables seem stiffer unless they are unknowns.
+        """
+        forces, rows = self._forces(of, x, placed, clock, 1.0), self._rows
+        motion, tensions = self._log.motion, forces.most_likely
+        if forces.inverse_root is None or self.at_rest:
+            return FeltTensions(tensions, np.zeros((*tensions.shape, 0)))
+        wrench = np.zeros((len(tensions), 6, 6))
+        force = (x[of.clock + 1] * motion.sigma[self._chosen])[:, None, None]
+        wrench[:, :3, :3] = force * np.eye(3)
+        wrench[:, 3:, :3] = force * points.skew(placed[1] @ x[of.clock + 2 : of.clock + 5])
+        wrench[:, 3:, 3:] = motion.turning_sigma[self._chosen, None, None] * np.eye(3)
+        inner = forces.inverse_root @ forces.inner
+        moved = np.swapaxes(inner, 1, 2) @ forces.inverse_root @ (self._scale[:, None] * wrench[:, rows])
+        return FeltTensions(tensions, forces.variances[..., None] * moved)
 
     def smoothed(self, tensions: np.ndarray) -> np.ndarray:
         """Return tensions of the whole log (N, m) [N], smoothed if the platform moves."""
@@ -281,29 +296,34 @@ class Balance:
         clock: float = 0.0,
         noise: float = 1.0,
         derive: bool = True,
+        carries: bool = False,
     ) -> Balanced:
         """Return the balance at positions (N, 3) and rotations (N, 3, 3) with values x (P,) of parameters.
 
         The platform's acceleration is that `clock` [s] later. `noise` is a factor of all standard deviations of
-        tensions and forces.
+        tensions and forces. `carries` tells whether derivatives of the most likely tensions are wanted, of a platform
+        that `hangs`.
         """
         robot, rows, scale, rotation = self._robot, self._rows, self._scale, placed[1]
         table, m, count = of.table(x), robot.m, len(rotation)
         of_log = self._forces(of, x, placed, clock, noise)
         inverse_root, A, r = of_log.inverse_root, of_log.A, of_log.r
         if inverse_root is None or of_log.reduced is None:
-            return Balanced(np.full((count, 6), np.inf))
+            return Balanced(np.full((count, 6), np.inf), tensions=np.full((count, m), np.nan))
         gain = float(table[:, 13].mean())
         residuals = np.zeros((count, 6))
         residuals[:, rows] = of_log.reduced / gain
-        if not derive:
-            return Balanced(residuals)
         tensions = of_log.most_likely
+        if not derive:
+            return Balanced(residuals, tensions=tensions)
         mass, arm = x[of.clock + 1], rotation @ x[of.clock + 2 : of.clock + 5]
         pull, by_arm = of_log.pull, of_log.by_arm
         raw = np.zeros((count, 6, of.count))
         S = np.empty((count, m, 6, 7))
         columns_by_geometry(of_log.record, of_log.poses, self._carriers, S)
+        behind = np.zeros((count, 6))  # what multiplies changes of the wrench matrix, (N, 6)
+        behind[:, rows] = (np.swapaxes(inverse_root, 1, 2) @ of_log.reduced[..., None])[..., 0] * scale
+        bent = np.einsum("nmik,ni->nmk", S, behind)
         S *= tensions[..., None, None]
         felt = np.einsum("nim,nmk->nimk", A, of_log.by_tensions)
         for i in range(m):
@@ -324,15 +344,28 @@ class Balance:
             result[:, rows] = weighted @ derivatives[:, rows]
             return result
 
-        carried = np.zeros((count, m, 6))
-        behind = np.swapaxes(of_log.inner, 1, 2) @ np.swapaxes(inverse_root, 1, 2)
-        carried[..., rows] = -gain * of_log.variances[..., None] * behind
-        by_parameters = reduce(raw)
+        reduced = reduce(raw), reduce(by_pose)
         # Errors of accelerations grow with the mass. Without their part, a smaller mass would make them smaller.
         of_forces = np.swapaxes(inverse_root[..., rows < 3], 1, 2)
         growing = mass * np.square(of_log.sigma)[:, None, None] * (of_forces @ residuals[:, rows, None])
-        by_parameters[:, rows, of.clock + 1] -= (np.swapaxes(of_forces, 1, 2) @ growing)[..., 0]
-        return Balanced(residuals, by_parameters, reduce(by_pose), carried)
+        growing = np.swapaxes(of_forces, 1, 2) @ growing  # (N, k, 1)
+        reduced[0][:, rows, of.clock + 1] -= growing[..., 0]
+        if not carries:
+            return Balanced(residuals, *reduced, tensions)
+        # With the most likely tensions t = s - V A'z, where z = (L L')^-1 r: dt = -V A'(L L')^-1 dr - C dA'z, in which
+        # dr is that at t, and C the covariance of t. The errors' growth by the mass counts twice.
+        inner, V = inverse_root @ of_log.inner, of_log.variances[..., None]
+        tensions_by, by = (-V * (np.swapaxes(inner, 1, 2) @ one[:, rows]) for one in reduced)
+        tensions_by[..., of.clock + 1] += (V * (np.swapaxes(inner, 1, 2) @ growing))[..., 0]
+        C = V * np.eye(m) - (V * np.swapaxes(inner, 1, 2)) @ (inner * of_log.variances[:, None])
+        for i in range(m):
+            own = i * (of.clock // m)
+            tensions_by[..., own : own + 6] -= C[:, :, i, None] * bent[:, None, i, :6]
+            tensions_by[..., own + 8] -= C[:, :, i] * bent[:, None, i, 6]
+            turned, unit = np.empty((count, 6, 6)), np.tile(np.eye(m)[i], (count, 1))
+            wrench_by_axes(of_log.record, of_log.poses, self._carriers, unit, turned)
+            by -= C[:, :, i, None] * (behind[:, None] @ turned)
+        return Balanced(residuals, *reduced, tensions, tensions_by, by)
 
 
 def hangs(robot: Robot, measurements: Measurements) -> bool:

@@ -12,18 +12,20 @@ from .model import Model, State
 ROUNDS = 10  # of fits without the readings of cables that the one before shows to be slack
 
 
-def carrying(model: Model, state: State) -> FeltTensions | None:
+def carrying(model: Model, state: State, errors: bool = False) -> FeltTensions | None:
     """Return the tensions of a platform that `hangs` at a state of the whole log, None for other logs.
 
-    They are smoothed, as noise of the poses, which lengths have as well, would look like stretch.
+    They are smoothed, as noise of the poses, which lengths have as well, would look like stretch. With `errors`, those
+    of accelerations are unknowns.
     """
     if model.forces is None or not hangs(model.robot, model.measurements):
         return None
-    tensions = np.zeros((len(model.measurements), model.robot.m))
-    for rows, part, own in model.parts(state):
+    found: list[FeltTensions] = []
+    for _, part, own in model.parts(state):
         assert part.forces is not None
-        tensions[rows] = part.forces.carrying(part.parameters, own.x, part.poses(own), part.ahead)
-    return FeltTensions(model.forces.smoothed(tensions), np.zeros((*tensions.shape, 0)))
+        found.append(part.forces.carrying(part.parameters, own.x, part.poses(own), part.ahead))
+    tensions, moved = (np.concatenate(of) for of in zip(*found, strict=True))
+    return FeltTensions(model.forces.smoothed(tensions), moved if errors else moved[..., :0])
 
 
 def slack(model: Model, state: State) -> np.ndarray:

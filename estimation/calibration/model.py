@@ -8,8 +8,8 @@ With the reading y of a cable, its length l at the pose, offset o, build-up b, s
 The second is in the units of the reading. The first would shrink with the robot, so a robot of zero size would fit
 best. With known poses the first is a linear regression, which readings that hardly change do not determine. f is 1, or
 1 / (1 + t / (E A)) if tensions are known, measured or by the weight that hangs from the cables, because readings refer
-to the unstrained cable. These tensions are given (`FeltTensions`), up to errors that are further unknowns of the
-sample, treated as coordinates of its pose.
+to the unstrained cable. Measured tensions are given (`FeltTensions`), those by weight and inertia follow from the
+parameters and the pose, both up to errors that are further unknowns of the sample, treated as coordinates of its pose.
 
 Where forces tell more than lengths, or parameters of theirs are free, the balance of the platform (`balance`) is a
 further residual of each sample. So are measured directions of cables (`sightings`).
@@ -170,29 +170,31 @@ class Model(Displayed):
 
     @cached_property
     def pulled_at_poses(self) -> bool:
-        """Return whether the tensions that stretch cables are those at the estimated poses of a platform at rest."""
-        pulled = self.felt is not None and self.measurements.tensions is None and self.size_is_open
-        return pulled and self.balanced is not None and self.balanced.at_rest
+        """Return whether cables are stretched by tensions that weight and inertia determine at the estimated poses."""
+        if self.felt is None or self.measurements.tensions is not None:
+            return False
+        if self._open:  # errors of accelerations, far larger at the ends of a log, must be unknowns then
+            return bool(self.parameters.groups)
+        wanted = "elasticity" in self.parameters.groups or (self.size_is_open and self.balanced is not None)
+        return wanted and self._forces.at_rest
 
     @property
     def _open(self) -> int:
         return 0 if self.felt is None else self.felt.errors.shape[2]
 
-    def _stretch(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _stretch(self, state: State, carried: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the length without strain for each metre of length, its tensions [N], (m, N), and their derivatives.
 
-        These are by the errors of the tensions, (m, N, d).
+        These are by the errors of the tensions, (m, N, d). `carried` are the tensions by weight and inertia, (N, m).
         """
         if self.felt_tensions is None:
             return np.ones((self.robot.m, 1)), np.zeros((self.robot.m, 1)), np.zeros((self.robot.m, 1, 0))
-        known = self.felt_tensions.tensions
-        if self.pulled_at_poses:
-            # The file's ends of cables do: derivatives by the ends of other cables would fill the normal matrix.
-            x = np.concatenate([self.parameters.first[: self.parameters.clock], state.x[self.parameters.clock :]])
-            known = self._forces.carrying(self.parameters, x, self.poses(state), self.ahead)
+        known = self.felt_tensions.tensions if carried is None else carried
         felt = (known + (self.felt_tensions.errors @ state.errors[..., None])[..., 0]).T
-        tensions = np.maximum(felt, 0.0)
-        by_errors = self.felt_tensions.errors.swapaxes(0, 1) * (felt > 0)[..., None]
+        # A bound of zero would be a kink, where no step helps; readings of slack cables are left out anyway.
+        least = 0.0 if carried is None else -0.5 / max(float(self.parameters.compliances(state.x).max()), 1e-300)
+        tensions = np.maximum(felt, least)
+        by_errors = self.felt_tensions.errors.swapaxes(0, 1) * (felt > least)[..., None]
         return 1 / (1 + tensions * self.parameters.compliances(state.x)[:, None]), tensions, by_errors
 
     def begin(self) -> State:
@@ -262,7 +264,13 @@ class Model(Displayed):
         run = runs(robot, table, position, rotation, at)
         carried = None if moving is None else moving.of_cables(robot, position + arms)
         slip, y = self.slips(state.x), self.measurements.lengths.T
-        stretch, tensions, by_errors = self._stretch(state)
+        stretches = "elasticity" in parameters.groups or bool(parameters.compliances(state.x).any())
+        forces, pulls = None, stretches and self.pulled_at_poses
+        if self.balanced is not None or pulls:
+            placed = position, rotation
+            forces = self._forces.at(parameters, state.x, placed, self.ahead, self.noise, derive, pulls)
+        pulled = forces if pulls else None
+        stretch, tensions, by_errors = self._stretch(state, None if pulled is None else pulled.tensions)
         scale0 = parameters.table(parameters.first)[:, 7:8]
         scale = table[:, 7:8]
         ratio, own = (scale0 / scale, scale0) if self.size_is_open else (np.ones_like(scale), scale)
@@ -277,14 +285,12 @@ class Model(Displayed):
             turned = points.rotation_vectors(state.turn)
             moved = np.concatenate([state.shift, turned, state.errors], axis=1)
             poses[held] = moved[held] / sigmas[held]
-        forces = None
-        if self.balanced is not None:
-            placed = position, rotation
-            forces = self.balanced.at(parameters, state.x, placed, self.ahead, self.noise, derive)
         # Forces alone would move a pose without readings to infinity, where all cables are parallel.
         weighs = inside & (self.weights.any(axis=0) | ~np.isinf(sigmas).any(axis=1))
         weighs = weighs if self.unbalanced is None else weighs & ~self.unbalanced
-        in_balance = np.zeros((len(position), 0)) if forces is None else forces.residuals * weighs[:, None]
+        in_balance = np.zeros((len(position), 0))
+        if self.balanced is not None and forces is not None:
+            in_balance = forces.residuals * weighs[:, None]
         seen = sightings(parameters, state.x, (position, rotation), run, at, self.measurements, carried, derive)
         if seen is not None:
             seen.leave_out(~inside)
@@ -297,9 +303,12 @@ class Model(Displayed):
         by_pose = by_length * run.by_pose
         cables = np.empty((m, len(position), OF_CABLE))
         cables[..., :6] = by_length * (run.by_geometry[..., :6] @ self._in_plane)
-        if forces is not None and forces.by_parameters is not None:  # of which forces know no more than lengths do
-            ends = forces.by_parameters[..., : parameters.clock].reshape(len(position), 6, m, OF_CABLE)[..., :6]
-            ends[:] = np.einsum("nkci,cij->nkcj", ends, self._in_plane)
+        by_parameters = [] if forces is None else [forces.by_parameters, forces.tensions_by_parameters]
+        by_poses = [] if forces is None else [forces.by_pose, forces.tensions_by_pose]
+        for one in by_parameters:  # of ends, of which forces know no more than lengths do
+            if one is not None:
+                ends = one[..., : parameters.clock].reshape(*one.shape[:2], m, OF_CABLE)[..., :6]
+                ends[:] = (ends[..., None, :] @ self._in_plane)[..., 0, :]
         cables[..., 6] = -gain
         cables[..., 7] = -gain * (excess / scale if self.size_is_open else y)
         cables[..., 8] = by_length[..., 0] * run.by_geometry[..., 6]
@@ -312,28 +321,26 @@ class Model(Displayed):
         if velocity is not None or (moved >= FRAMES.start).any():
             twists = twists_of(base, state.x[parameters.clock :][FRAMES], robot.home[:3], moved, state.turn)
             others[..., : len(moved)] = np.swapaxes(np.swapaxes(by_pose, 0, 1) @ twists, 0, 1)
-            if forces is not None and forces.by_parameters is not None and forces.by_pose is not None:
-                forces.by_parameters[..., parameters.clock + moved] += forces.by_pose[..., :6] @ twists
+            for one, by in zip(by_parameters, by_poses, strict=True):
+                if one is not None and by is not None:
+                    one[..., parameters.clock + moved] += by[..., :6] @ twists
             if seen is not None and seen.robot is not None and seen.poses is not None:
                 seen.robot[..., moved] += seen.poses @ twists
             if carried is not None:
                 others[..., last == 0] -= np.einsum("mni,mni->mn", by_pose[..., :3], carried[0])[..., None]
         others[..., last == COMMON] += cables[..., 10:11]
         by_tension = (by_strain * parameters.compliances(state.x)[:, None])[..., None]
-        pulled = forces.carried if self.pulled_at_poses and forces is not None else None
-        if pulled is not None and forces is not None and forces.by_pose is not None:
-            pulls = pulled * ((tensions > 0)[..., None] * by_tension).swapaxes(0, 1)  # (N, m, 6)
-            by_pose = by_pose + (pulls @ forces.by_pose).swapaxes(0, 1)
-            if forces.by_parameters is not None:
-                own = forces.by_parameters[..., parameters.clock + moved]
-                others[..., : len(moved)] += (pulls @ own).swapaxes(0, 1)
+        through = None
+        if pulled is not None and pulled.tensions_by_parameters is not None and pulled.tensions_by_pose is not None:
+            by_pose = by_pose + by_tension * pulled.tensions_by_pose.swapaxes(0, 1)
+            through = by_tension * pulled.tensions_by_parameters.swapaxes(0, 1)
         for column, (cable, first) in enumerate(parameters.slips, start=len(moved)):
             others[cable, first:, column] = -gain[cable, first:]
-        forces = self._kept(forces, weighs)
+        forces = None if self.balanced is None else self._kept(forces, weighs)
         if self._open:
             by_errors = by_tension * by_errors
             by_pose = np.concatenate([by_pose, np.broadcast_to(by_errors, (*by_pose.shape[:2], self._open))], axis=2)
-        return residuals, Derivatives(cables, others, by_pose, arms, run.lengths, forces, seen)
+        return residuals, Derivatives(cables, others, by_pose, arms, run.lengths, forces, seen, through)
 
     def _kept(self, one: Balanced | None, rows: np.ndarray) -> Balanced | None:
         """Return residuals of samples with their derivatives, zero except in some rows (N,) of bool."""
@@ -354,7 +361,10 @@ class Model(Displayed):
         table = self.parameters.table(state.x)
         y = self.measurements.lengths.T
         unstrained = table[:, 6:7] + self.slips(state.x) + (table[:, 7:8] + table[:, 9:10] * y) * y
-        return (unstrained / self._stretch(state)[0]).T
+        carried = None
+        if self.pulled_at_poses:
+            carried = self._forces.carrying(self.parameters, state.x, self.poses(state), self.ahead).tensions
+        return (unstrained / self._stretch(state, carried)[0]).T
 
     def moved(self, state: State, dx: np.ndarray, dq: np.ndarray | None) -> State:
         """Return the state after changes of parameters (P,), and of poses and errors, (N, 6 + d) or None if fixed."""

@@ -35,6 +35,7 @@ class Motion(NamedTuple):
         rate, spin: Angular velocity [rad/s] and acceleration [rad/s^2] in {G}, (N, 3).
         turning: Rate of the angular momentum about the CoM in {G}, (N, 3) [N m].
         sigma: Standard deviation of the acceleration, 0 where the platform rests, (N,) [m/s^2].
+        turning_sigma: Standard deviation of `turning`, 0 where accelerations are unknown, (N,) [N m].
         smooth: Smoothing of values (N, d) by parabolas, None without times.
         is_known: Whether the poses show how the platform accelerates, or it is at rest, also by poses without times.
     """
@@ -45,6 +46,7 @@ class Motion(NamedTuple):
     spin: np.ndarray
     turning: np.ndarray
     sigma: np.ndarray
+    turning_sigma: np.ndarray
     smooth: Polynomials | None = None
     is_known: bool = True
 
@@ -72,7 +74,7 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
     """Return the motion of a log: of the cables by their readings, of the platform by its poses if these are known."""
     count, times = len(measurements), measurements.times
     gravity, zero = np.tile(robot.gravity, (count, 1)), np.zeros((count, 3))
-    rest = Motion(np.zeros((count, robot.m)), gravity, zero, zero, zero, np.zeros(count))
+    rest = Motion(np.zeros((count, robot.m)), gravity, zero, zero, zero, still := np.zeros(count), still)
     if times is None:
         return rest._replace(is_known=not _seems_to_move(robot, measurements))
     if count < 2 * FEWEST + 1 or np.median(np.diff(times)) > SLOWEST:
@@ -111,7 +113,8 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
     if robot.platform.inertia is not None:
         inertia = rotation @ robot.inertia @ np.swapaxes(rotation, 1, 2)
         momentum, change = (np.einsum("nij,nj->ni", inertia, part) for part in (rate, spin))
-        rest = rest._replace(turning=change + np.cross(rate, momentum))
+        noise = 2 * moved.noise[2, :, 3:].max(axis=1) * float(np.linalg.eigvalsh(robot.inertia)[-1])
+        rest = rest._replace(turning=change + np.cross(rate, momentum), turning_sigma=noise)
     return rest._replace(gravity=gravity - moved.bends[:, :3], rate=rate, spin=spin, sigma=sigma)
 
 

@@ -9,7 +9,8 @@ With J and G the derivatives of all residuals by parameters and by the pose of e
 with prior standard deviations as residuals of their own. With L_k L_k' = C_k, the sum is one product Y'Y of the matrix
 Y of all L_k^-1 E_k on top of each other. Parameters are multiplied by `metric`, so that each is a length [m]. Damping
 adds to the diagonals of J'J and of C_k. A reading, and each component of a direction, has derivatives by the parameters
-of its own cable and of the robot, so the normal matrix is assembled from blocks. The balance of forces depends on all.
+of its own cable and of the robot, so the normal matrix is assembled from blocks. The balance of forces depends on all,
+as do readings of cables that weight stretches.
 """
 
 from __future__ import annotations
@@ -167,6 +168,14 @@ class _Layer(NamedTuple):
     e: np.ndarray  # (m, k N)
     poses: np.ndarray  # by the poses of the samples, (m, N, k, 6 or more)
 
+    def depending_on_all(self, more: np.ndarray) -> _Layer:
+        """Return the same rows with further derivatives (m, k N, P), by which no row is of its own cable alone."""
+        m, _, width = self.J.shape
+        for i in range(m):
+            more[i, :, i * width : (i + 1) * width] += self.J[i]
+        more[..., m * width :] += self.others
+        return self._replace(J=self.J[..., :0], others=more)
+
     def add(self, full: np.ndarray, right: np.ndarray) -> None:
         """Add J'J and J'e to the normal matrix and its right side, in place."""
         m, _, width = self.J.shape
@@ -210,6 +219,11 @@ def _layers(
     others = derivatives.others / scale[parameters.clock + last]
     keep = np.concatenate([flags[:, used].ravel(), np.ones(len(last), dtype=bool)])
     layers = [_Layer(J, others, residuals.readings, derivatives.poses[:, :, None])]
+    if derivatives.through is not None:
+        of_cables = derivatives.through[..., : parameters.clock].reshape(*J.shape[:2], *factors.shape)
+        of_cables = of_cables[..., used] / factors[:, used]  # (m, N, m, width)
+        of_robot = derivatives.through[..., parameters.clock + last] / scale[parameters.clock + last]
+        layers = [layers[0].depending_on_all(np.concatenate([of_cables.reshape(*J.shape[:2], -1), of_robot], axis=2))]
     seen = derivatives.directions
     if seen is not None and seen.cables is not None and seen.robot is not None and seen.poses is not None:
         m, count = seen.residuals.shape[:2]

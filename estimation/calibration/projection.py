@@ -49,9 +49,14 @@ class Part(NamedTuple):
         own = self.derivatives.cables[cable][:, where[mine] - first]
         rows = np.hstack([own, self.derivatives.others[cable]])
         rows, columns = rows / self.scale[where[mine | rest]], np.flatnonzero(mine | rest)
-        if self.Y is None:
+        through = self.derivatives.through
+        if self.Y is None and through is None:
             return rows, columns
-        whole = -np.einsum("na,nap->np", self.root(cable), self.Y)
+        whole = np.zeros((len(rows), len(where)))
+        if through is not None:
+            whole += through[cable][:, where] / self.scale[where]
+        if self.Y is not None:
+            whole -= np.einsum("na,nap->np", self.root(cable), self.Y)
         whole[:, columns] += rows
         return whole, np.arange(len(where))
 

@@ -72,3 +72,5 @@ class Derivatives(NamedTuple):
     lengths: np.ndarray
     balance: Balanced | None = None
     directions: Sighted | None = None
+    # derivatives of readings by all parameters, through the tensions by weight and inertia, (m, N, P)
+    through: np.ndarray | None = None

@@ -207,7 +207,9 @@ def _weighed(model: Model, result: Fit, length: float, stretches: bool) -> tuple
         model = _stretched(model, state, length) if stretches else model
         if model is before:
             break
-        result = fit(model, state._replace(errors=model.begin().errors), length)
+        begin = model.begin()
+        same = state.errors.shape == begin.errors.shape
+        result = fit(model, state if same else state._replace(errors=begin.errors), length)
     return model, result
 
 
@@ -263,7 +265,7 @@ def model_of(
         model = replace(model, start=placed(robot, measurements, start))
     elastic = "elasticity" in groups or parameters.compliances(parameters.first).any()
     begin = model.begin()
-    felt = carrying(model, begin._replace(x=near.parameters) if near else begin) if elastic else None
+    felt = carrying(model, begin._replace(x=near.parameters) if near else begin, True) if elastic else None
     if weights is None:
         carried = felt.tensions if felt and near else None
         weights = ~np.any(list(left_out(robot, measurements, carried).values()), axis=0).T
