@@ -25,11 +25,11 @@ def time(
 ) -> None:
     """Find the fastest motion along a task's path with every tension inside its limits.
 
-    It uses these keys of the task: `path`, `base` (hold or given), `margin`, and in `limits` the speeds of platform,
-    cables and carriers, their accelerations, winch_power and platform_lateral_acceleration. `duration` is ignored,
-    except for circles. `wind: [0, 0, 0]` includes the drag of still air; without `wind` there are no aerodynamic
-    forces. Any other wind or limit, a tube, a free base, `phases`, `initial`, `final`, `robust` or `stop_within` is an
-    error.
+    It uses these keys of the task: `path`, `base` (hold or given), `margin`, and in `limits` the speeds of platform
+    (also zone_speed), cables and carriers, their accelerations, winch_power and platform_lateral_acceleration.
+    `duration` is ignored, except for circles. `wind: [0, 0, 0]` includes the drag of still air; without `wind`
+    there are no aerodynamic forces. Any other wind or limit, a tube, a free base, `phases`, `initial`, `final`,
+    `robust` or `stop_within` is an error.
 
     The motion is audited like every plan. The result is a task file that contains the time law, and `towline plan`
     reads it like any other task. The exit code is 1 if no motion is found.

@@ -39,7 +39,7 @@ typedef struct {
     double axis[3];   /* swivel axis of the pulley in the carrier's frame, of unit length, as the cable comes up it */
     double radius;    /* of the pulley's sheave; 0: the anchor is a point */
     double stiffness; /* E A [N]; 0: the cable does not stretch */
-    double damping;   /* [N s] */
+    double damping;   /* [N s/m] */
     double winch_inertia; /* as the mass that the cable feels [kg] */
     double winch_friction, winch_speed_max, winch_force_max;
 } towline_cable;

@@ -176,9 +176,9 @@ class TensionProblem(Displayed):
         $$
 
         with $\hat t_i$ the tension inside the limits that is nearest to 0. The first part is relative to what the
-        problem requires, so a huge limit does not raise it. The second is the rounding error of A t. The part of its
-        sum with |t_i| is replaced, if it is larger, by 1e10 times the large brackets plus the part with |t_ref,i|:
-        with larger tensions that cancel, rounding alone could give any wrench.
+        problem requires, so a huge limit does not raise it. The second is the rounding error of A t. In it, the sum
+        over |t_i| counts at most as 1e10 times the large brackets plus the sum over |t_ref,i|, because with larger
+        tensions that cancel, rounding alone could give any wrench.
 
         Args:
             tensions: The tensions to check [N], shape (m,).

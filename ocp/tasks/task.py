@@ -46,7 +46,7 @@ class Tube(Part):
         "radius about the path [m]; 0: followed exactly; free: the path is only an initial guess", 0.0
     )
     attitude: NonNegative | Literal["free"] = optional(
-        "range of each of roll, pitch, yaw about the path [rad]; 0: followed exactly; free: 1.2 rad", 0.0
+        "largest deviation of each of roll, pitch, yaw from the path [rad]; 0: followed exactly; free: 1.2 rad", 0.0
     )
     ends: Literal["free", "rest", "periodic", "exact"] | None = optional(
         "state at the start and the end. free: anywhere in the tube; periodic: the end state equals the start state, "

@@ -54,7 +54,7 @@ def chapter() -> Chapter:
     literal, paid_out = (
         driving_force(robot, *motions[large], still, STEP, ELEMENTS, winding=how).dT_K[:, 0].max() for how in WINDINGS
     )
-    steps = ", ".join(f"{amplitude * 1e6:.3g} um at {step * 1e3:g} ms" for step, amplitude in amplitudes.items())
+    steps = ", ".join(f"{size * 1e6:.3g} um with steps of {step * 1e3:g} ms" for step, size in amplitudes.items())
     ratio = float(largest_ratios(robot, np.array([amplitudes[STEP]]))[0])
     claims = [
         claim("fig-9-length").undetermined(
