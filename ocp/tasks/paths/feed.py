@@ -34,7 +34,7 @@ class FeedPath(PathBase):
         min_length=2,
         json_schema_extra=or_file,
         description="at least two positions [m], or poses with the same attitude [m, rad]; a task may give the name of "
-        "a file of points instead, .csv with units in its header or .gcode, relative to the task file",
+        "a file of points instead, .csv with units in its header or G-code, relative to the task file",
     )
     origin: Vector3 | None = optional(FILE_ORIGIN)
     feed: Positive | None = optional("speed [m/s]; default: the feed of each line of a .gcode file")

@@ -44,7 +44,7 @@ class WaypointPath(PathBase):
         min_length=2,
         json_schema_extra=or_file,
         description="at least two poses or positions [m, rad]; a task may give the name of a file of points instead, "
-        ".csv with units in its header or .gcode, relative to the task file",
+        ".csv with units in its header or G-code, relative to the task file",
     )
     origin: Vector3 | None = optional(FILE_ORIGIN)
     shape: Literal["legs", "spline"] = optional(
