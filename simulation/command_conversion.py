@@ -39,7 +39,7 @@ class Orders:
         self._record = plant.record if record is None else record
         rigid = np.flatnonzero(plant.record["cable"]["stiffness"][: robot.m] == 0)
         self._rigid = int(rigid[0]) if rigid.size else None  # a cable with tensions that no length determines
-        self._last = np.full((len(seeds), 2, robot.m), np.nan)  # lengths and rates
+        self._last = np.full((len(seeds), 2, robot.m), np.nan)  # as `winch_lengths` keeps them of a period
         wind = conditions.wind
         self.wind = None if wind is None else np.stack([_air(wind, times, seed) for seed in seeds], axis=1)
         calm = None if self.wind is None else np.zeros(3)
@@ -88,6 +88,7 @@ class Orders:
             if self._drive != "lengths":
                 raise InputError(f"drive must be 'lengths' for a controller that commands lengths, got {self._drive!r}")
             self._cables[:] = command.lengths if drives is None else drives.lengths(command.lengths)
+            self._last[:] = np.nan  # the next tensions come from a motion that `winch_lengths` has not followed
             if part < self._parts - 1:
                 last = states[:, self._commanded]
                 self._cables[:] = last + (self._cables - last) / (self._parts - part)

@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 
 from towline import load, plan
 from towline.base.errors import InputError
-from towline.control import ANSWERS, Command, ComputedTorque, Controller, OpenLoop, Predictive, State
+from towline.control import ANSWERS, Command, ComputedTorque, Controller, LengthControl, OpenLoop, Predictive, State
 from towline.control.trajectory import read_trajectory
 from towline.core._core import sense, winch_lengths
 from towline.models import Dynamics, Robot
@@ -241,9 +241,10 @@ def test_cables_of_fixed_length_carry_the_weight_from_the_start_of_a_rounded_pla
 def test_winding_makes_the_tension_that_is_ordered():
     """The tension of a linear cable with damper, whose length moves evenly in a first period, then with acceleration.
 
-    Ordered is the mean of the second period but for the cable's own stiffness, whose tension grows until its end.
+    Ordered is the mean of the second period but for the cable's own stiffness, whose tension grows until its end. After
+    a period too short to show how rates change, they are taken to stay.
     """
-    rng, period = np.random.default_rng(2), 1e-3
+    rng = np.random.default_rng(2)
     EA, C = rng.uniform(1e4, 1e6, 4), rng.uniform(0, 300, 4)
     plant = Plant("planar-4", stiffness=EA, damping=C)
     own, order = rng.uniform(1, 5, (3, 4)), rng.uniform(5, 50, (3, 4))
@@ -251,7 +252,8 @@ def test_winding_makes_the_tension_that_is_ordered():
     wound = rows[:, layout.COMMANDS : layout.COMMANDS + 4]
     lengths = np.stack([own * rng.uniform(1, 1.002, (3, 4)), rng.normal(size=(3, 4))], axis=1)
     last, acceleration = np.full((3, 2, 4), np.nan), np.zeros((3, 4))
-    for _ in range(2):
+    for period in (5e-4, 1.4e-3, 1e-5, 1e-3):
+        acceleration *= period != 1e-3
         winch_lengths(plant.record, states, lengths, order, last, rows, period)
         rate = lengths[:, 1] + period / 2 * acceleration - (wound - own) / period  # mean, of the elongation
         bent = period**2 / 12 * acceleration  # what the mean of a parabola is below that of its ends
@@ -262,8 +264,22 @@ def test_winding_makes_the_tension_that_is_ordered():
         lengths[:, 1] += period * acceleration
 
 
+class Mixed(Controller):
+    """Order lengths for a tenth of a second, before and after it tensions."""
+
+    def __init__(self, robot):
+        self.both = ComputedTorque(robot), LengthControl(robot)
+
+    def reset(self):
+        for one in self.both:
+            one.reset()
+
+    def step(self, time, state, reference):
+        return [one.step(time, state, reference) for one in self.both][0.1 <= time < 0.2]
+
+
 def test_a_fast_motion_with_stiff_dampers_is_flown_as_with_exact_tensions():
-    """And by Newton's law with the mean tensions that sensors report.
+    """Also where a controller orders lengths in between, and by Newton's law with the mean tensions of sensors.
 
     A winch whose cable's rate lags by half a period acts like 0.1 kg more on each cable: 19 mm in this motion. Without
     the rate of the last period, the platform acts like 0.06 kg more (0.8 mm), and means of
@@ -274,6 +290,7 @@ def test_a_fast_motion_with_stiff_dampers_is_flown_as_with_exact_tensions():
     made = plan(robot, {"path": line, "duration": 0.5, "base": {"kind": "free"}})
     run = simulate(robot, made)
     assert run.error.max() < 7e-4
+    assert simulate(robot, made, Mixed(robot)).error.max() < 0.05
     motions = run.record.motions
     A = Dynamics(robot).wrench_matrix(motions[:, 0, :6], motions[:, 1:, :6])
     pulls = (A @ run.record.tensions[..., None])[:-1, :3, 0]

@@ -73,7 +73,8 @@ void towline_plant_sense(const towline_robot *robot, ptrdiff_t rows, const doubl
  * The unstrained lengths that winches without a model reach within a period, so that tensions are as ordered; see
  * winch_lengths.c. All arrays are rows of m numbers, but `states`, whole states, `lengths`, rows of 2 m as from
  * `towline_plant_sense`, and `commands`, `commands_per` numbers from one row's command to the next, of which those of
- * the cables are written. `last` has the lengths one period before, nan if there were none, and gets those now.
+ * the cables are written. `last`, rows of 2 m numbers, has the lengths that cables would have now at the rates of one
+ * period before, and how long this one lasted [s], nan if there was none; it gets those of the period that begins.
  */
 void towline_plant_winch_lengths(const towline_robot *robot, ptrdiff_t rows, double period, const double *states,
                                  const double *lengths, const double *tensions, double *last, double *commands,

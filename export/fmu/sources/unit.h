@@ -33,7 +33,7 @@ typedef struct {
     double longest_step; /* of Runge-Kutta [s] */
     double winding_time; /* how long winches keep a rate or force on the way to a tension [s] */
     double mass;         /* of the platform [kg] */
-    double state[UNIT_STATE], last[2 * UNIT_CABLES]; /* the lengths of cables a step before, and their rates */
+    double state[UNIT_STATE], last[2 * UNIT_CABLES]; /* see towline_plant_winch_lengths */
     /* The controller, and what it knows of the robot. */
     towline_robot known;
     towline_controller controller;
