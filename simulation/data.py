@@ -82,9 +82,9 @@ class SimulationData(Displayed):
 
     @cached_property
     def above(self) -> np.ndarray:
-        """Return the excess of tensions over t_max plus its tolerance [N], (n, m); negative inside."""
-        robot = self.robot
-        return self.record.tensions[: self._recorded] - robot.t_max - TENSION_TOLERANCE * (robot.t_max - robot.t_min)
+        """Return the excess of tensions over t_max plus its tolerance [N], (n, m); negative inside or undefined."""
+        most = self.robot.t_max + TENSION_TOLERANCE * (self.robot.t_max - self.robot.t_min)
+        return np.nan_to_num(self.record.tensions[: self._recorded] - most, nan=-np.inf)
 
     @cached_property
     def outside(self) -> np.ndarray:
@@ -117,7 +117,7 @@ class SimulationData(Displayed):
             deep = quantity(self.outside[row, side], "m")
             lines.append(f"the platform was {deep} {room.names[side]} at t = {self.times[row]:.3f} s")
         tensions = self.record.tensions[: self._recorded]
-        row, cable = np.unravel_index(np.nanargmax(self.above), self.above.shape)
+        row, cable = np.unravel_index(self.above.argmax(), self.above.shape)
         if self.above[row, cable] > 0:
             lines.append(
                 f"{quantity(tensions[row, cable], 'N')} in cable {cable + 1} at t = {self.times[row]:.3f} s "
