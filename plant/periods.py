@@ -63,7 +63,7 @@ class Periods:
         - `states`, `commands`: (N, n) and (N, K, k), see `Plant`: the first command belongs to the period; carriers
           move on to a second.
         - `history`, `tensions`: results, (N, 2, n) and (N, 2, m) [N].
-        - `means`: results, (N, m) [N], with which the momentum of the bodies changes.
+        - `means`: results, (N, m) [N], with which the momentum of the bodies changes but for impacts.
         """
         of_rows = (states, commands, history, tensions, means)
         run_plant(self.record, self._settings, *of_rows, 1, self.period, self._substeps, 1)
