@@ -539,8 +539,9 @@ def test_speed_without_a_limit_is_refused():
     """A load that keeps its place in {G} while its carrier drifts by a hair: tensions hardly tell the speed."""
     robot = point_mass([[0, 0, 4]], ["z"], "prescribed")
     path, drift = RestPath(kind="rest", pose=(0, 0, 0)), LinePath(kind="line", start=(0, 0, 4), end=(0, 0, 5))
-    with pytest.raises(InputError, match="that bounds the speed, because the tension limits"):
-        time_along(robot, along(path, {"c0": drift}))
+    for limits in ({}, {"winch_power": 5.0}):
+        with pytest.raises(InputError, match="carrier_acceleration that bounds the speed, because the tension limits"):
+            time_along(robot, along(path, {"c0": drift}, limits=limits))
     assert time_along(robot, along(path, {"c0": drift}, limits={"carrier_speed": 1.0})).feasible
 
 

@@ -168,13 +168,11 @@ def phase_plane(
         P, Q = (part[:, own] / force[own] for part in winches.reflected)
         c = np.append(low[own] / force[own] - 1, -high[own] / force[own] - 1)
         accelerations.append((np.hstack([-P, P]), np.hstack([-Q, Q]), np.broadcast_to(c, (len(s), len(c)))))
-    with np.errstate(divide="ignore"):
-        at_least = (powers / low).min(axis=1)  # the largest ds/dt, with tensions at their lower limits
     # The reserve must not turn the only wrench into none.
     low, high, inside = available.low, available.high, np.reshape(reserve, (-1, 1))
     middle = (low + high) / 2
     available = replace(available, low=np.minimum(low + inside, middle), high=np.maximum(high - inside, middle))
-    x_max = np.minimum(parametrised.speed_limit(platform, carriers, limits) * (1 - shrink), at_least) ** 2
+    x_max = (parametrised.speed_limit(platform, carriers, limits) * (1 - shrink)) ** 2
     return PhasePlane(wrench, available, x_max, accelerations, winches)
 
 

@@ -46,7 +46,7 @@ from .fastest_law import FastestLaw
 from .parametrised_path import ParametrisedPath, PathLimits
 from .phase_plane import proofs
 from .piece import RESERVE, Piece, solved_piece
-from .timed_task import ACCELERATIONS, KNOWN_LIMITS, SPEEDS, check_task
+from .timed_task import ACCELERATIONS, KNOWN_LIMITS, SPEEDS, WITHOUT_POWER, check_task
 
 ATTEMPTS = 12
 MOST_INTERVALS = 6400
@@ -145,8 +145,8 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
             return _shown(task, proven)
         if any(piece.law.unlimited for piece in pieces):
             raise InputError(
-                f"limits must have one of {', '.join(KNOWN_LIMITS)} that bounds the speed, because the tension limits "
-                "alone do not bound it along this path, got none"
+                f"limits must have one of {', '.join(WITHOUT_POWER)} that bounds the speed, because the tension limits "
+                "and winch_power alone do not bound it along this path, got none"
             )
         stuck = next((piece for piece in pieces if piece.law.x is None), None)
         if stuck is not None:
