@@ -201,7 +201,7 @@ def test_who_hangs_or_breaks_is_out_and_the_others_go_on():
     assert rows["wrong"].max_error == pytest.approx(1e-3)
     assert rows[REFERENCE].failures == 0
     page = tension.markdown(tension.Report(list(rows.values()), "here", 4, 2))
-    assert "| broken (RuntimeError: no licence) |  | - | - | - | - | 0 of 0 |" in page
+    assert "| broken (RuntimeError: no licence) | - | - | - | - | 0 of 0 |" in page
 
 
 @pytest.mark.parametrize(
