@@ -203,8 +203,10 @@ class Matching:
                 noise = np.sum(self._echoed[used] ** 2)
                 shown = shown and noise <= BLURRED * np.sum(self.slope(first, name)[:, used] ** 2)
             explained = float(removed / max(whole - count, removed, 1e-12))
-            # Poses that are computed have errors of lengths and directions, of which each parameter explains some.
-            least = LEAST[int(name in ALONE and not self.windows.recorded.computed)]
+            # Poses that are computed have errors of lengths and directions, of which each parameter explains some, and
+            # lengths that do not drive the plant have the errors of its poses, of which stiffness explains some.
+            indirect = self.windows.recorded.computed or (name == "stiffness" and self.windows.drive == "tensions")
+            least = LEAST[int(name in ALONE and not indirect)]
             named = shown and bool(certainly.any()) and explained > least and removed > REMOVED * whole
             named = bool(named and whole > NOTHING * count)
             old, new, sigma = (_plain(one) for one in (before, value, sigma))
@@ -216,7 +218,7 @@ def applicable(windows: Windows) -> Sequence[str]:
     """Return the parameters on which a simulation with such commands depends."""
     recorded = windows.recorded
     felt = windows.drive != "lengths" or (recorded.tensions is not None and recorded.robot.fixed_lengths is None)
-    names = {"delay": windows.commanded, "friction": felt, "mass": True, "stiffness": windows.drive != "tensions"}
+    names = {"delay": windows.commanded, "friction": felt, "mass": True, "stiffness": windows.shows_stiffness}
     names |= {"tilt": True, "com": bool(recorded.robot.dof_mask[3:].any()), "load_cells": recorded.tensions is not None}
     names |= {"cable_friction": felt, "anchors": recorded.robot.fixed_lengths is None}
     names["thrusts"] = len(windows.flown) > 0

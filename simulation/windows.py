@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..base.errors import InputError
+from ..estimation.logs.encoders import stretched
 from ..estimation.logs.pose_track import PoseTrack, track_of
 from ..estimation.logs.recorded import Recorded
 from ..estimation.logs.recording import GAP
@@ -63,6 +64,12 @@ class Windows:
             self.notes.append("cables without a stiffness in the file are assumed to stretch by 0.1 % at t_max")
         if self.drive == "lengths" and recorded.tensions is None and robot.fixed_lengths is None:
             self.notes.append("lengths do not show friction of the winches: record tensions or motor currents for that")
+        # whether the recording shows the stiffness: lengths that winches measure, and other commands than tensions
+        self.shows_stiffness = self.drive != "tensions" and not self.measured_command
+        if recorded.lengths is not None and not recorded.under_tension:
+            self.shows_stiffness |= self.drive == "lengths" or not self.assumed
+        if not self.shows_stiffness and not self.assumed:
+            self.notes.append("tensions and lengths from anchor to attachment do not show the stiffness of the cables")
         none = robot.m * (0.0,)  # parameters of the file
         usual = {"load_cells": 2 * none, "cable_friction": none, "anchors": 3 * none}
         usual["thrusts"] = len(robot.carriers) * (0.0,)
@@ -377,9 +384,10 @@ class Windows:
             gains, zeros = self._cells(with_)
             parts["tensions"] = np.where(inside, of.tensions[rows] - (gains * behind + zeros), 0.0)
         if "lengths" in self.noise and of.lengths is not None:
-            stretches = not (self.drive == "tensions" and self.assumed)
-            stretch = 1 + stretches * tensions / plant.record["cable"]["stiffness"][: self.robot.m]
-            away = np.where(inside, of.lengths[rows] - lengths / stretch, 0.0)
+            # The file's stiffness made lengths under tension unstrained, and an assumed one is not in the readings.
+            of_file = of.under_tension or (self.drive == "tensions" and self.assumed)
+            by = of.robot if of_file else plant.robot
+            away = np.where(inside, of.lengths[rows] - lengths / stretched(by, tensions), 0.0)
             away -= away.sum(axis=2, keepdims=True) / inside.sum(axis=1, keepdims=True)  # offsets of the encoders
             parts["lengths"] = np.where(inside, away, 0.0)
         self.widths = [part.shape[-1] for part in parts.values()]

@@ -157,6 +157,8 @@ def test_friction_that_drives_do_not_compensate_is_named(tmp_path):
     result = replay(COGIRO, rubbed.save(tmp_path / "rubbed.nc"), fit=True)
     assert result.named == ["friction"]
     assert result.found[0].value == pytest.approx(8.0, rel=0.06)
+    assert "tensions and lengths from anchor to attachment do not show the stiffness of the cables" in result.notes
+    assert "stiffness" not in [one.name for one in result.found]
     assert [cable.winch for cable in result.robot.cables] == 8 * [WINCH]  # that of the file is compensated
 
 
@@ -247,6 +249,7 @@ CASES = [  # of measured tensions, two other tests find the mass and the delay
     ("lengths", "stiffness", with_cables(PLANAR, stiffness=24e3), {}, 1 / 1.2),
     ("lengths", "delay", PLANAR, {"delay": 0.02}, 0.0),
     ("drives", "mass", with_mass(COGIRO, 1.2), {}, 1 / 1.2),
+    ("drives", "stiffness", with_cables(COGIRO, stiffness=240e3), {}, 1 / 1.2),  # by lengths that winches measure
     ("thrusts", "mass", with_mass(load("multi-quadrotor-3"), 1.2), {}, 1 / 1.2),
 ]
 

@@ -50,6 +50,8 @@ class Recorded(Displayed):
     doubt: str | None = None  # probable input error of the log, in one line, or None
     # True if poses to compare with are computed from lengths and directions of cables, whose errors they include
     computed: bool = False
+    # True if `lengths` follow from those under tension, by the tensions and the file's stiffness, which they hide
+    under_tension: bool = False
 
 
 def read_recorded(
@@ -112,7 +114,8 @@ def read_recorded(
         commands, is_length = at(found.commands, known.m), bool(found.commands) and found.commands[0].unit in LENGTHS
         motors = bool(found.commands) and re.search("motor(?!.*tension)", found.commands[0].full.lower()) is not None
         lengths = lengths_of(known, measured.lengths) if read.fields.lengths else None
-        if lengths is not None and efforts is not None:  # which are lengths under tension
+        under_tension = lengths is not None and efforts is not None
+        if lengths is not None and under_tension:
             lengths = lengths / lengths_of(known, np.ones_like(efforts), efforts) * lengths_of(known, np.ones(known.m))
         if commands is not None and is_length:
             # Readings may have errors that the commands do not have.
@@ -152,6 +155,7 @@ def read_recorded(
             notes=notes,
             doubt=doubt,
             computed=computed,
+            under_tension=under_tension,
         )
     except InputError as error:
         text = str(error)
