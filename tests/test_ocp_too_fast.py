@@ -57,6 +57,17 @@ def test_a_motion_that_exists_is_never_proven_too_fast(seed, rests):
     assert not exceeded(limited, places, spread, rests)
 
 
+def test_a_cable_rests_only_where_both_of_its_ends_do():
+    """A carrier that moves evenly accelerates the cables to a platform at rest by less than 4 d / T^2."""
+    poses = np.zeros((2, len(TIMES), 6))
+    poses[1, :, 0] = 0.25 * TIMES
+    lengths = Dynamics(ROBOT).cable_lengths(poses[0], poses[1:].swapaxes(0, 1))
+    most = np.abs(np.diff(lengths, 2, axis=0)).max() / TIMES[1] ** 2
+    limited, rests = scenario(100, 100, cable_acceleration=1.01 * most), np.array([True, False])
+    assert most < 0.3 * 4 * np.ptp(lengths, axis=0).max() / TIMES[-1] ** 2
+    assert not list(too_fast(limited, TIMES, poses, np.zeros(poses.shape[:2]), rests, rests))
+
+
 @pytest.mark.parametrize("share", [0.99, 1.01])
 def test_the_bounds_between_two_rests_are_those_of_constant_speed_and_of_bang_bang(share):
     """Over d in T: the speed is at least d / T; the acceleration at least 4 d / T^2, which bang-bang control has."""
