@@ -67,16 +67,11 @@ def steadied(model: Model, state: State, length: float) -> tuple[Model, State]:
 
     The sum of squares is flat along such directions: noise would move the parameters far. A prior holds them, too.
     """
-    noise = np.zeros((0, 0)) if model.prior else observed(model, state, length).noise  # (p, d)
-    return keeping(model, state, noise) if noise.size else (model, state)
-
-
-def keeping(model: Model, state: State, directions: np.ndarray) -> tuple[Model, State]:
-    """Return the model that keeps the file's values along orthonormal directions (p, d), and the state moved there."""
+    if model.prior or not (noise := observed(model, state, length).noise).size:  # directions (p, d)
+        return model, state
     scale, varies = metric(model), model.parameters.varies
-    rows, dx = np.zeros((directions.shape[1], model.parameters.count)), np.zeros_like(state.x)
-    rows[:, varies] = directions.T * scale[varies]
-    dp = -directions @ (rows @ (state.x - model.parameters.first))
+    rows, dx = np.zeros((noise.shape[1], model.parameters.count)), np.zeros_like(state.x)
+    rows[:, varies] = noise.T * scale[varies]
+    dp = -noise @ (rows @ (state.x - model.parameters.first))
     dx[varies] = dp / scale[varies]
-    kept = rows if model.kept is None else np.vstack([model.kept, rows])
-    return replace(model, kept=kept), model.moved(state, dx, NormalEquations.at(model, state, scale).poses_after(dp))
+    return replace(model, kept=rows), model.moved(state, dx, NormalEquations.at(model, state, scale).poses_after(dp))
