@@ -17,6 +17,7 @@ from towline.estimation.logs.recorded import read_recorded
 from towline.models.cable import Winch
 from towline.plant import Plant
 from towline.simulation import Replay, replay
+from towline.simulation.replayed_robot import Parameters, changed
 from towline.simulation.windows import Windows
 
 from .warm import towline as run
@@ -264,6 +265,11 @@ def test_what_is_wrong_is_named_first(kind, name, robot, options, truth, logs):
     assert after is not None
     assert result._rms(after)["position"] < result.rms()["position"] * 1.05
     assert re.search(rf"; {name} \(.*\) explains", result.report().splitlines()[0])
+
+
+@pytest.mark.parametrize("robot", [COGIRO, load("point-mass-3")])
+def test_a_heavier_platform_has_as_much_more_inertia(robot):
+    assert changed(robot, Parameters(mass=1.2)).platform == with_mass(robot, 1.2).platform
 
 
 def test_a_thrust_that_is_recorded_too_low_is_no_mass(tmp_path):
