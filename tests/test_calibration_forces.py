@@ -17,6 +17,7 @@ from towline.estimation.calibration import Measurements, calibrate, outliers, so
 from towline.estimation.calibration import representative as module
 from towline.estimation.calibration.autocorrelation import information_of
 from towline.estimation.calibration.balance import FeltTensions
+from towline.estimation.calibration.cross_validation import compare
 from towline.estimation.calibration.fit import fit
 from towline.estimation.calibration.hanging import carrying
 from towline.estimation.calibration.model import Model
@@ -430,6 +431,11 @@ def test_stretch_of_cables_is_found_by_the_weight_that_hangs_from_them():
     assert "cables stretch: E A is" in str(found.report())
     wrong = np.array([cable.anchor for cable in found.robot.cables]) - anchors
     assert np.linalg.norm(wrong, axis=1).max() < 6e-3  # 20 mm and more without stretch
+    # Validation samples are stretched by the tensions of the fit, not by those with which it began.
+    model = found._solved.model
+    begun = model.felt._replace(tensions=0.5 * model.felt.tensions)
+    held_out = compare(replace(found._solved, model=replace(model, felt=begun)), found.free, found.prior)
+    assert held_out.after == pytest.approx(found.held_out.after, rel=1e-6)
     assert "elasticity" not in calibrate(*hanging(1, 0.0)[1:]).free
     for lost, is_found in ((slice(150, 152), True), (slice(100, 120), False)):  # accelerations are then unknown
         poses = log.poses.copy()

@@ -222,7 +222,8 @@ def _compare(solved: Solved, sets: list[tuple[str, ...]], prior: dict[str, float
     for clock in {"clock" in one for one in sets} | {False}:
         whole = model_of(of.robot, measurements, ("clock",) if clock else (), {}, of.track, weights)
         of_forces: dict[str, Any] = {name: getattr(of, name) for name in ("noise", "unbalanced", "ahead")}
-        of_forces["felt"] = of.felt or carrying(of, solved.fit.state)
+        # A fit of a hanging platform may begin with tensions of quite another geometry.
+        of_forces["felt"] = carrying(of, solved.fit.state, of.felt is not None) or of.felt
         wholes[clock] = replace(whole, weighs=weighs, **of_forces)
     if len(measurements) > MOST_COMPARED:
         rows = np.linspace(0, len(measurements) - 1, MOST_COMPARED).astype(int)
