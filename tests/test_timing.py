@@ -153,7 +153,7 @@ def test_minimum_time_on_a_line_agrees_with_an_optimal_control_program():
     assert timing.duration == pytest.approx(best, rel=0.01)
 
 
-@pytest.mark.parametrize("power", [None, 500.0])
+@pytest.mark.parametrize("power", [None, 200.0])
 def test_motors_of_winches_give_the_minimum_time_of_an_optimal_control_program(power):
     """Their inertia is the mass of the platform; every second motor can do more than its cable."""
     data = load("ipanema-1").model_dump()
