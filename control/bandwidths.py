@@ -17,7 +17,9 @@ that are held for a period (Jury), each alone. Together they keep
 
     h (lag / 2 + (delay / 0.647 + period) / 1.5) <= 0.5        h >= 6 k
 
-with the bandwidth k of the loops of position around them, which by Routh need h > 2 k without any delay. Drives whose
+with the bandwidths k of the loops around them, of position and of deviations from the reference. By Routh, those of
+position need h > 2 k without any delay. How far apart steps are is known only later: h is then lowered (control/
+slow_loops.py) so that lag, delay and steps keep the first bound together. Drives whose
 commands lead by a known lag have all of this lag while the commands are at their limits, where a loop with h lag > 2
 oscillates for good. So with all of the lag the bound is 1 in place of 0.5, unless h would be below 15 rad/s.
 """
@@ -42,6 +44,7 @@ from .weights import accelerations, ripple
 NOISE = 0.05  # of gravity: acceleration by noise of the measured state
 LOST, UNSTABLE = 2.0, 1.5  # times the bounds: robots are lost
 DELAY, PERIOD = 0.647, 1.0  # times the inverse of h: where a late or a held state alone makes attitude loops unstable
+LAG = UNSTABLE / 2  # as late as a period that leaves attitude loops the same margin
 CALM = 0.03  # the same where winches have to follow the noise, as long as it leaves `LEAST` of the usual bandwidths
 MISTOLD = 0.8  # of a known delay over which states are predicted: more than twice what may be wrong about it
 LEAST = 0.1  # of the usual bandwidths: with less a robot does not follow
@@ -50,7 +53,7 @@ GRAVITY, TINY = 9.81, 1e-12  # [m/s^2]; what divides
 ATTITUDE = 40.0  # [rad/s]
 USUALLY, AT_LIMITS = 0.5, 1.0  # bounds of h times lateness; where commands at their limits cannot lead
 SLOWEST = 15.0  # [rad/s], of attitude loops: teams were lost below
-PLACE, CASCADE = 5.0, 6.0  # bandwidth of position [rad/s], and of attitude over it at least
+PLACE, CASCADE = 5.0, 6.0  # bandwidth of position [rad/s]; attitude over it and over that of deviations, at least
 
 
 class Usual(NamedTuple):

@@ -15,14 +15,14 @@ from ..models.files import AnyRobot, as_robot
 from ..models.record import record_of
 from ..solvers.in_place import InPlace
 from .as_floats import ROUNDING, as_floats, is_time, measured_at, rows_of
-from .bandwidths import DELAY, HELD, PERIOD, SWINGING, age_of, bandwidths_for, noise_of, place_for
+from .bandwidths import CASCADE, DELAY, HELD, LAG, PERIOD, SWINGING, age_of, bandwidths_for, noise_of, place_for
 from .carried_load import CarriedLoad
 from .command import NOTHING, NOWHERE, PLANNED, SHIFTED, SOFT, Command
 from .controllability import uncontrolled
 from .controller import Controller
 from .deviation import Deviation
 from .fallback import NEGLIGIBLE, answer_others
-from .lag import WINCHES_KEEP, RotorLead, tension_lead
+from .lag import ROTORS_KEEP, WINCHES_KEEP, RotorLead, tension_lead
 from .late_states import OLDEST, LateStates
 from .noise import Noise
 from .one_at_a_time import OneAtATime
@@ -61,8 +61,8 @@ class ComputedTorque(Controller):
             `bandwidth` and `observer` are lowered, because the loop is unstable from 1 / b on. Both are restored after
             two steps that are closer together. A given bandwidth is kept, with a warning. If carriers fly, all
             bandwidths are lowered by the same factor, because their attitude loops need steps of at most 0.75 /
-            `attitude`, less 1.5 times the mean age of the states if these have a `time`. Other carriers that correct
-            errors need steps of at most 0.75 / `carrier_bandwidth`.
+            `attitude`, less 1.5 times the mean age of the states and 0.75 times what is left of `rotor_lag`. Other
+            carriers that correct errors need steps of at most 0.75 / `carrier_bandwidth`.
         damping: Damping ratio z: Kd = 2 z b.
         integral: Ki [1/s^3], a number or one for each coordinate. It pauses while the status is not "as planned".
         observer: Bandwidth of the estimates of the disturbance and of forces on flying carriers [rad/s]; 0: no
@@ -72,9 +72,9 @@ class ComputedTorque(Controller):
             `core/control/compensation.c`): position [m] and attitude [rad]. Default: 0, but 0.5 m with fewer cables
             than degrees of freedom.
         carrier_bandwidth, carrier_acceleration: Bandwidth of the carriers' deviation [rad/s], and its largest
-            acceleration [m/s^2 and rad/s^2]. Default of the bandwidth: 6, but a quarter of `place` if the robot
-            has flying carriers and at least as many cables as degrees of freedom: with a larger one, carriers that turn
-            and the damping of their cables make the observer's loop unstable.
+            acceleration [m/s^2 and rad/s^2]. Default of the bandwidth: 6, but at most a sixth of `attitude`, and a
+            quarter of `place` if the robot has flying carriers and at least as many cables as degrees of freedom: with
+            a larger one, carriers that turn and the damping of their cables make the observer's loop unstable.
         place, attitude: Bandwidths of the position and attitude loops of flying carriers [rad/s]
             (core/control/thrusts.c). Default of `attitude`: 40, or less if the known lags of rotors and sensors require
             it (control/bandwidths.py); of `place`: 5, but at most a sixth of `attitude`. If carriers turn so late that
@@ -129,14 +129,14 @@ class ComputedTorque(Controller):
         self._known_age = age * (age <= OLDEST)  # of states without a time
         if carrier_bandwidth is None:
             steady = not few and any(carrier.efforts for carrier in self.robot.carriers)
-            carrier_bandwidth = held / 4 if steady else QUICK
+            carrier_bandwidth = held / 4 if steady else min(QUICK, loops.attitude / CASCADE)
         gains = loops.bandwidth, damping, integral, loops.observer
         of_carriers = carrier_bandwidth, carrier_acceleration, held
         self._settings = settings_of(self.robot, self._limits, *gains, *of_carriers, patience)
         self._reach = far = reach_of(self.robot, (0.5 if few else 0.0, 0.0) if reach is None else reach)
         set_reach(self._settings, far)
         self._settings["attitude"] = self._attitude = loops.attitude
-        self._flies = bool(self._settings["by_wrench"].any())
+        self._flies, self._turns_late = bool(self._settings["by_wrench"].any()), LAG * min(rotors, ROTORS_KEEP)
         self._slow_loops = SlowLoops(self._settings, bandwidth is None, usual.bandwidth)
         self._usual_longest = self._slow_loops.longest
         loop, lag = number("tension_loop", tension_loop, 0.0, 1e3), number("tension_lag", tension_lag, 0.0, 1.0)
@@ -305,7 +305,7 @@ class ComputedTorque(Controller):
             self._late = seen_so
             if not observes:
                 self._carried.continue_observer(self._platform, float(self._settings["observer"]), seen_so[:, 0])
-        missing, self._optimal, self._are_far = done
+        self._planned, (missing, self._optimal, self._are_far) = self._carriers[:, :, 2].copy(), done
         self._is_missing = missing > 0  # cables or their sensors
         self._time, self._seen, self._elapsed = time, seen, dt
         return dt, state, reference
@@ -320,13 +320,13 @@ class ComputedTorque(Controller):
             self._lead.agree(sender._lead)
 
     def _late_by(self, age: float, dt: float) -> float:
-        """Return the time between steps that delays attitude loops as much as the mean age of states [s].
+        """Return the time between steps that delays attitude loops as much as lags and the mean age of states [s].
 
         The mean is over all states during the first second, because a loop may be unstable with the first ones.
         """
         self._aged_for = min(self._aged_for + dt, 1.0)
         self._age += min(dt / self._aged_for if self._aged_for else 1.0, 1.0) * (min(age, OLDEST) - self._age)
-        return ceil(1e3 * self._age - ROUNDING) / 1e3 * PERIOD / DELAY
+        return self._turns_late + ceil(1e3 * self._age - ROUNDING) / 1e3 * PERIOD / DELAY
 
     def _slow_down(self, period: float, late: float) -> None:
         """Lower bandwidths for late states and commands that are held for a period [s], or warn of given ones."""
@@ -356,7 +356,8 @@ class ComputedTorque(Controller):
             stay_inside(carriers, *self._boxes)
         carriers = carriers[0] if alone else carriers
         moving = carriers[..., 0, :], carriers[..., 1, :], carriers[..., 2, :]
-        self._accelerations = moving[2].tobytes()
+        # Carriers that fly turn before they accelerate, so what a solution adds does not act within a state's age.
+        self._accelerations = (np.nan_to_num(self._planned) if self._flies else moving[2]).tobytes()
         actuation = None
         if self._flies:
             memory = self._cables, self._platform, self._of_carriers, self._turning, self._actuation

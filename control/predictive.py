@@ -17,7 +17,7 @@ from ..solvers.horizon import Horizon
 from ..solvers.in_place import InPlace
 from ..statics.distribution import tensions as tensions_at
 from .as_floats import ROUNDING, as_floats
-from .bandwidths import PATIENT, STILL, TEAM, TOWING, bandwidths_for, noise_of_change
+from .bandwidths import CASCADE, PATIENT, STILL, TEAM, TOWING, bandwidths_for, noise_of_change
 from .carrier_references import moved_coordinates
 from .command import HOLD, OTHERWISE, SHIFTED, SOFT, Command
 from .computed_torque import ComputedTorque
@@ -78,8 +78,8 @@ class Predictive(ComputedTorque):
             length if carriers correct errors. A flying carrier that does not correct errors is moved by the
             compensation of `ComputedTorque`, not by the solution.
         carrier_bandwidth, carrier_acceleration: Bandwidth with which carriers return to their reference [rad/s]
-            (default: 2, but 6 if carriers correct errors), and their largest acceleration in addition to the
-            reference's [m/s^2 and rad/s^2].
+            (default: 2, but 6 if carriers correct errors, at most a sixth of `attitude`), and their largest
+            acceleration in addition to the reference's [m/s^2 and rad/s^2].
         tube: Largest distance of the platform from its reference [m] (default: no limit).
         keep_out: Bodies in {G} that the platform's frame and attachments should avoid, as in a task's `keep_out`. Exact
             penalties enforce tube and bodies wherever the tensions allow. The reference may pass through a body.
@@ -134,7 +134,8 @@ class Predictive(ComputedTorque):
         rotors = number("rotor_lag", rotor_lag, 0.0, 0.1)
         own = bandwidths_for(the_robot, usual, sensors, rotors, bandwidth, observer, attitude)
         self._bandwidth = own.bandwidth
-        carrier_bandwidth = usual.carrier_bandwidth if carrier_bandwidth is None else carrier_bandwidth
+        if carrier_bandwidth is None:
+            carrier_bandwidth = min(usual.carrier_bandwidth, own.attitude / CASCADE)
         self._returning = number("carrier_bandwidth", carrier_bandwidth, 1e-3, 1e3)
         self._strongest = number("carrier_acceleration", carrier_acceleration, 0.0, 1e4)
         self._stages = whole_number("stages", stages, 1, 200)

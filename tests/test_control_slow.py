@@ -7,7 +7,8 @@ import pytest
 
 from towline import load, simulate
 from towline.base.errors import InputError
-from towline.control import ComputedTorque, Predictive, State
+from towline.control import ComputedTorque, Predictive, Reference, State
+from towline.statics.distribution import tensions
 
 PERIODS = [0.05, 0.1, 0.15]
 
@@ -183,3 +184,34 @@ def test_attitude_loops_are_slowed_down_for_states_that_are_late():
     assert run.error.max() < 0.06  # if the loops are slowed down late, the team is 0.16 m off, and 15 mm at the end
     assert run.error[-200:].max() < 4e-3
     assert controller._platform["attitude"][0] < 16
+
+
+@pytest.mark.parametrize(("lag", "delay", "period"), [(0.03, 0.005, 5e-3), (0.0, 0.03, 2e-3), (0.01, 0.01, 1e-2)])
+def test_attitude_loops_keep_a_margin_for_lag_delay_and_steps_together(lag, delay, period):
+    """A lag of 15 ms and a delay of 5 ms permit 39.5 rad/s, but with steps of 5 ms nothing would be left.
+
+    A loop with the time T = lag + D and C = lag D + D^2 / 2 is stable for h (T + 4 C / T) < 2 (core/control/turning.c),
+    and a command that is held for a period is half of it late. The loops around it are slower.
+    """
+    robot = load("multi-quadrotor-3")
+    controller = ComputedTorque(robot, rotor_lag=lag, sensors={"delay": delay})
+    simulate(robot, robot.home, controller, duration=3 * period, period=period, noise={"delay": delay})
+    h, left, late = float(controller._platform["attitude"][0]), min(lag, 0.015), delay + period / 2
+    T, C = left + late, left * late + late**2 / 2
+    assert 1.2 < 2 / (h * (T + 4 * C / T)) < 1.7
+    assert controller._settings["carrier_bandwidth"] <= (1 + 1e-9) * h / 6
+
+
+def test_what_carriers_are_ordered_does_not_move_them_before_they_turn(monkeypatch):
+    """A late state of a team at rest is one at rest, whatever was ordered since."""
+    monkeypatch.setattr("towline.control.predictive.grows", lambda *_: False)  # to save its simulation
+    robot, nothing = load("multi-quadrotor-3"), np.zeros(6)
+    still, rest = np.zeros_like(robot.carrier_home), tensions(robot, robot.home).tensions
+    away, most = np.array([0.05, 0, 0, 0, 0, 0]), 0.0
+    reference = Reference(robot.home + away, nothing, nothing, robot.carrier_home + away, still, still, rest)
+    controller = Predictive(robot, sensors={"delay": 0.03})
+    for k in range(8):
+        command = controller.step(2e-3 * k, State(robot.home, nothing, robot.carrier_home, still, rest), reference)
+        most = max(most, np.abs(command.carrier_acceleration).max())
+        assert np.abs(controller._measured[0, 1:, 6:]).max() < 1e-9
+    assert most > 0.1
