@@ -33,7 +33,7 @@ from .time_law import PathTiming
 NEAR = 0.08  # of a motion's extent: where a place is, of which a program has rows the first time
 FEW = 8  # regions
 ROUNDS = 4  # of rows that are added where a solution exceeds what the program leaves out; then it has all
-PASSES = 3
+PASSES = 3  # with linear distances; more, at most as many as `ROUNDS`, where true distances are still missed
 MOST_COARSE = 150  # iterations of a program that only leads to another: those that end well take 20 to 90
 MOST_AGAIN = 60  # iterations from a solution that is near: more do not lead to one
 APPROACHED = 1e-3  # of a distance's scale: what true distances may miss at the end
@@ -239,7 +239,7 @@ class Search:
                     continue
                 best, motion, missed = outcome, outcome.deviation, linear.missed(outcome.deviation)
                 settled = missed <= APPROACHED and outcome.objective > objective - GAIN * abs(objective)
-                if settled or passed + 1 >= PASSES:
+                if settled or (passed + 1 >= PASSES and missed <= APPROACHED):
                     break
                 objective = outcome.objective
         return best if missed <= USABLE else None
