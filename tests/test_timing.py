@@ -545,6 +545,17 @@ def test_speed_without_a_limit_is_refused():
     assert time_along(robot, along(path, {"c0": drift}, limits={"carrier_speed": 1.0})).feasible
 
 
+@pytest.mark.parametrize(
+    ("limits", "named"),
+    [({"winch_power": 1e-6}, "winch_power of cable 1"), ({"platform_speed": 1e-6}, "speed of platform")],
+)
+def test_a_limit_that_permits_only_a_motion_of_days_is_named(limits, named):
+    """The power that lifts 2 kg by 1 m in 10^4 s is 2 mW."""
+    robot = point_mass([[0, 0, 4]], ["z"])
+    with pytest.raises(InputError, match=rf"limits must permit a motion of at most 10000 s, .* by {named}"):
+        time_along(robot, along(straight(robot, [0, 0, 1, 0, 0, 0]), limits=limits))
+
+
 def test_without_the_extra_it_says_how_to_install_it(monkeypatch):
     for name in [name for name in sys.modules if name.partition(".")[0] == "toppra"]:
         monkeypatch.setitem(sys.modules, name, None)

@@ -39,7 +39,7 @@ from ..tasks.paths import (
     TimedPath,
     WaypointPath,
 )
-from ..tasks.scenario import Scenario
+from ..tasks.scenario import MOST_SAMPLES, Scenario, least_audit_rate
 from ..tasks.status import MotionStatus
 from ..tasks.task import GivenBase, Task, read_task
 from .fastest_law import FastestLaw
@@ -157,6 +157,7 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
             continue
         x = [piece.law.x for piece in pieces]
         law = replace(law, sd=np.sqrt(np.concatenate([x[0][:1], *(each[1:] for each in x)])))
+        _check_duration(task, law)
         scenario = lay_out(parametrised.robot, _timed(task, law))
         audited = audit(scenario, None)
         if audited.passed:
@@ -182,6 +183,17 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
         else:
             short.append(missing)
             shrink = min(shrink + 2 * excess, LARGEST_SHRINK)
+
+
+def _check_duration(task: Task, law: FastestLaw) -> None:
+    """Refuse limits that permit only motions that are too long to be audited; name the one that acts for longest."""
+    longest, seconds = MOST_SAMPLES / least_audit_rate(task), law.path.natural_duration or 0.0
+    if seconds > longest:
+        most = max(law.bottlenecks, key=lambda each: each.seconds)
+        raise InputError(
+            f"task {task.name!r}: limits must permit a motion of at most {longest:g} s, the longest that is audited, "
+            f"got one of {seconds:g} s, limited for {most.seconds:g} s by {most.limit}"
+        )
 
 
 def _rests(s: np.ndarray) -> np.ndarray:
