@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from towline.models import Dynamics, load
+from towline.models import Dynamics, Robot, load
 from towline.ocp import MotionStatus, plan
 from towline.ocp.limits.cables import WinchPower
 from towline.ocp.proofs.infeasible_ends import infeasible_ends
@@ -130,23 +130,40 @@ def test_cables_are_too_fast_where_their_lengths_change_too_much():
     assert not plan(ROBOT, task | {"limits": {"cable_speed": 3 * change / 2}}).stages[0].message
 
 
-@pytest.mark.parametrize("share", [0.99, 1.01])
-def test_a_duration_is_too_short_for_the_strength_of_all_cables(share):
-    """Bang-bang control with all of t_max and gravity along the line takes T = 2 sqrt(d / a), and no motion less."""
-    most = ROBOT.t_max.sum() / ROBOT.platform.mass + 9.81
-    line = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}
-    seconds = share * 2 * np.sqrt(np.linalg.norm([0.5, 0.3, 0.2]) / most)
-    task = {"path": line, "duration": seconds, "tube": {"position": 0.05}, "steps": 20}
-    proof = infeasible_ends(lay_out(ROBOT, read_task(task)))
-    assert (proof is not None) == (share < 1)
-    if proof is not None:
-        (excess,) = proof.excess
-        assert (excess.limit, excess.bound) == ("duration", pytest.approx(seconds / share))
-        planned = plan(ROBOT, task)
-        assert planned.status is MotionStatus.INFEASIBLE
-        (offer,) = planned.relaxations
-        assert offer.name == "duration"
-        assert plan(ROBOT, task | {"duration": offer.possible}).feasible
+@pytest.mark.parametrize("height", [0.5, -0.5])
+def test_a_duration_is_too_short_for_cable_and_gravity(height):
+    """Bang-bang control of a mass on a vertical cable takes T^2 = 2 d (m / (t_max - m g) + m / (m g - t_min))."""
+    mass, t_min, t_max = 2.0, 1.0, 40.0
+    cable = {"carrier": "frame", "anchor": [0, 0, 4], "attachment": [0, 0, 0], "t_min": t_min, "t_max": t_max}
+    robot = Robot(
+        name="mass",
+        source="test",
+        platform={"mass": mass, "dof": ["z"], "home": [0, 0, 0, 0, 0, 0]},
+        carriers=[{"name": "frame", "kind": "ground"}],
+        cables=[cable],
+    )
+    weight = 9.81 * mass
+    seconds = np.sqrt(2 * abs(height) * mass * (1 / (t_max - weight) + 1 / (weight - t_min)))
+    task = {"path": {"kind": "line", "start": [0, 0, 0], "end": [0, 0, height]}, "tube": {"position": 0.1}, "steps": 40}
+    planned = plan(robot, task | {"duration": 0.99 * seconds})
+    assert planned.status is MotionStatus.INFEASIBLE
+    (excess,) = planned.audit.excess
+    assert (excess.limit, excess.bound) == ("duration", pytest.approx(seconds, rel=1e-4))
+    (offer,) = planned.relaxations
+    assert offer.name == "duration"
+    assert plan(robot, task | {"duration": offer.possible}).feasible
+    assert plan(robot, task | {"duration": 1.03 * seconds}).feasible
+
+
+def test_suspended_platforms_fall_no_faster_than_gravity_lets_them():
+    """Half-way the platform is 0.9 m lower than at its rests, within 0.1 m: at least sqrt(2 * 0.7 m / g) from each."""
+    task = {"path": {"kind": "waypoints", "points": [[0, 0, 3], [0, 0, 2.1], [0, 0, 3]]}, "tube": {"position": 0.1}}
+    robot = load("cogiro")
+    proof = infeasible_ends(lay_out(robot, read_task(task | {"duration": 0.6})))
+    (excess,) = proof.excess
+    assert excess.limit == "duration"
+    assert 2 * np.sqrt(2 * 0.7 / 9.81) < excess.bound < 1.5
+    assert infeasible_ends(lay_out(robot, read_task(task | {"duration": 1.5}))) is None
 
 
 def test_a_short_turn_about_an_origin_is_feasible_though_the_centre_of_mass_is_elsewhere():
@@ -199,7 +216,7 @@ def test_a_duration_is_too_short_for_the_thrusts_of_all_carriers_whatever_the_at
     most = (4 * 40 * np.sin(0.6) + 4 * 1.5 * 5) / robot.platform.mass
     seconds = share * 2 * np.sqrt(1.0 / most)
     task = {"path": {"kind": "line", "start": [0, 0, 0], "end": [0.6, 0.8, 0]}, "duration": seconds, "steps": 20}
-    task |= {"base": {"kind": "free", "ends": "rest"}, "tube": {"attitude": 0.15}}
+    task |= {"base": {"kind": "free", "ends": "rest"}, "tube": {"position": 0.2, "attitude": 0.15}}
     proof = infeasible_ends(lay_out(robot, read_task(task)))
     assert (proof is not None) == (share < 1)
     if proof is not None:
