@@ -11,6 +11,9 @@ from towline import Dynamics, Planner, Robot, load, plan, time_along
 from towline.base.errors import InputError
 from towline.models import Uncertainty
 from towline.models.mechanics import derivatives
+from towline.ocp.proofs.too_uncertain import too_uncertain
+from towline.ocp.tasks.lay_out import lay_out
+from towline.ocp.tasks.task import read_task
 from towline.statics.robust import _inverse, ellipsoid_factor, motion_factor, share_of_robots, spread
 
 from .warm import towline
@@ -169,11 +172,13 @@ def test_no_plan_is_an_answer(tmp_path):
     robot = known("wang-flying", 0.01)
     assert plan(robot, HOVER).feasible
     found = plan(robot, HOVER | {"robust": 0.95})
-    assert found.status.value == "not-found"
-    assert "no motion was found with limits tightened by up to" in found.reason
+    assert found.status.value == "infeasible"
     (excess,) = found.audit.excess
     assert excess.limit == "tension"
-    assert excess.value - excess.bound == pytest.approx(-found.robust.violation.max())
+    row = np.abs(found.audit.times - excess.time).argmin()
+    sigmas = spread(robot, found.audit.motion.pose[[row]], found.audit.tensions[[row]])[0]
+    missed = found.audit.tensions[row] - 1.6448536 * sigmas - robot.t_min  # the quantile 95 % of a single limit
+    assert excess.value - excess.bound == pytest.approx(missed.min(), rel=1e-3)
     assert found.share_of_robots(seed=7).share < 0.9
     report = found.report()
     assert re.search(r"95 % of the robots +to first order, tensions do not always stay inside", report)
@@ -186,6 +191,26 @@ def test_no_plan_is_an_answer(tmp_path):
     )
     assert turned.feasible
     assert turned.share_of_robots(seed=7).share >= 0.95
+
+
+def test_robots_without_tensions_for_the_share_are_proven():
+    """Tensions of four cables in a plane lie on a line: none on it is far enough from all limits, or one is."""
+    robot, share = known("planar-4", 0.01), 0.95
+    pose, rows = robot.home + np.array([0.2, 0, 0.1, 0, 0, 0]), np.flatnonzero(robot.dof_mask)
+    A = Dynamics(robot).wrench_matrix(pose, robot.carrier_home)[rows]
+    w = Dynamics(robot).required_wrench(pose, np.zeros(6), np.zeros(6))[rows]
+    line = np.linspace(-1, 1, 20_001)[:, None] * 2 * robot.t_max.max()
+    tensions = np.linalg.pinv(A) @ w + line * np.linalg.svd(A)[2][-1]
+    from_limits = np.minimum(tensions - robot.t_min, robot.t_max - tensions).min(axis=1)
+    tensions = tensions[from_limits >= 0]
+    sigmas = spread(robot, np.tile(pose, (len(tensions), 1)), tensions)
+    # The largest errors, in units of 0.01 m, at which some tensions are 1.645 standard deviations from all limits.
+    each = np.minimum(tensions - robot.t_min, robot.t_max - tensions) / (1.6448536 * sigmas)
+    most = each.min(axis=1).max()
+    task = read_task({"path": {"kind": "rest", "pose": pose.tolist()}, "duration": 0.5})
+    for part in (0.99, 1.01):
+        proven = too_uncertain(lay_out(known("planar-4", 0.01 * part * most), task), share)
+        assert bool(proven) == (part > 1)
 
 
 def test_what_is_offered_to_robots_suffices_for_the_share():
@@ -268,7 +293,7 @@ def test_robots_that_weigh_little_keep_their_limits_too():
             cable[name] = 1e-6 * cable[name] if cable[name] is not None else None
     robot = Robot.model_validate(data)
     assert plan(robot, HOVER).feasible
-    assert plan(robot, HOVER | {"robust": 0.95}).status.value == "not-found"
+    assert plan(robot, HOVER | {"robust": 0.95}).status.value == "infeasible"
 
 
 def test_a_pose_that_only_the_exact_robot_can_hold_is_no_plan_for_others():
@@ -279,7 +304,7 @@ def test_a_pose_that_only_the_exact_robot_can_hold_is_no_plan_for_others():
     assert exact.feasible
     assert exact.share_of_robots(count=50).share < 0.5
     found = plan(robot, rest, robust=0.95)
-    assert found.status.value == "not-found"
+    assert found.status.value == "infeasible"
     assert "since the cables hardly resist some direction" in str(found.audit.excess[0])
 
 

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 
 from ...base.display import Displayed
+from ...base.text import quantity
+from .excess import Excess
 
 
 @dataclass(frozen=True)
@@ -33,3 +35,21 @@ class RobustMargin(Displayed):
             "tightened": self.tightened.tolist(),
             "worst_violation": float(self.violation.max()),
         }
+
+
+def closest_to_limit(
+    time: float, tensions: np.ndarray, reach: np.ndarray, low: np.ndarray, high: np.ndarray, share: float, why: str = ""
+) -> Excess:
+    """Return the excess of the tension that is closest to a limit, or farthest beyond it, at an instant.
+
+    `reach` is how far the tensions of a share of the robots differ from `tensions`; all are (m,) [N].
+    """
+    from_low, from_high = tensions - reach - low, high - tensions - reach
+    cable = int(np.minimum(from_low, from_high).argmin())
+    below = bool(from_low[cable] < from_high[cable])
+    side, bound = ("at least", low + reach) if below else ("at most", high - reach)
+    text = f"{quantity(100 * share, '%')} of the robots differ by up to {quantity(reach[cable], 'N')}"
+    if reach[cable] > high[cable]:
+        text += ", since the cables hardly resist some direction"
+    about, value = f"cable {cable + 1}", float(tensions[cable])
+    return Excess("tension", about, float(time), value, float(bound[cable]), "N", side, text + why)

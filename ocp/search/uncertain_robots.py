@@ -19,9 +19,10 @@ from ...base.text import quantity
 from ...models import Robot, Uncertainty
 from ...statics.robust import Spread, motion_factor
 from ..audits.excess import Excess
-from ..audits.robust_margin import RobustMargin
+from ..audits.robust_margin import RobustMargin, closest_to_limit
 from ..audits.tensions import tolerance_of
 from ..plan import Plan
+from ..proofs.too_uncertain import too_uncertain
 from ..result import Offers, PlannerStep, Relaxed
 from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out
@@ -80,7 +81,11 @@ def for_robots(first: Plan, task: Task, share: float, climb: Climb) -> Plan:
     plan = replace(plan, stages=tuple(stages), build_s=float(spent[0]), solve_s=float(spent[1]))
     if plan.robust is None or plan.robust.holds:
         return plan
-    return replace(plan, reason=reason, offers=partial(_near, robot, task, share, climb, tried, tightened))
+    plan = replace(plan, reason=reason, offers=partial(_near, robot, task, share, climb, tried, tightened))
+    if proven := too_uncertain(first.scenario, share):
+        audit = replace(plan.audit, excess=proven)
+        return replace(plan, status=MotionStatus.INFEASIBLE, reason="", audit=audit)
+    return plan
 
 
 def _near(robot: Robot, task: Task, share: float, climb: Climb, tried: list[Plan], tightened: np.ndarray) -> Offers:
@@ -195,17 +200,9 @@ def _limits(scenario: Scenario, times: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 def _excess(scenario: Scenario, plan: Plan, margin: RobustMargin) -> Excess:
     """Return the largest excess of a tension with its spread."""
-    row, cable = np.unravel_index(int(margin.violation.argmax()), margin.violation.shape)
-    audit, reach = plan.audit, float(margin.reach[row, cable])
+    row, audit = int(margin.violation.max(axis=1).argmax()), plan.audit
     low, high = _limits(scenario, audit.times)
-    value = float(audit.tensions[row, cable])
-    below = value - reach < low[row, cable]
-    bound = float(low[row, cable] + reach if below else high[cable] - reach)
-    why = f"{quantity(100 * margin.share, '%')} of the robots differ by up to {quantity(reach, 'N')}"
-    if reach > high[cable]:
-        why += ", since the cables hardly resist some direction"
-    side = "at least" if below else "at most"
-    return Excess("tension", f"cable {cable + 1}", float(audit.times[row]), value, bound, "N", side, why)
+    return closest_to_limit(audit.times[row], audit.tensions[row], margin.reach[row], low[row], high, margin.share)
 
 
 def _narrow(robot: Robot, by: np.ndarray, task: Task) -> np.ndarray:
