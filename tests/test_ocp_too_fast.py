@@ -155,6 +155,16 @@ def test_a_duration_is_too_short_for_cable_and_gravity(height):
     assert plan(robot, task | {"duration": 1.03 * seconds}).feasible
 
 
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_a_range_of_durations_leaves_the_time_law_to_the_planner(share):
+    """The path's own law needs 7.5 d / T^2 where bang-bang needs 4 d / T^2: only less than that is too little."""
+    most = 2 * share * np.sqrt(1.0 / 1.25)
+    task = {"path": {"kind": "line", "start": [0, 0, 1], "end": [1, 0, 1]}, "duration": {"min": 0.1, "max": most}}
+    task |= {"objective": {"time": 1}, "limits": {"platform_acceleration": 1.25}}
+    proof = infeasible_ends(lay_out(ROBOT, read_task(task)).lasting(most))
+    assert (proof is not None) == (share < 1)
+
+
 def test_suspended_platforms_fall_no_faster_than_gravity_lets_them():
     """Half-way the platform is 0.9 m lower than at its rests, within 0.1 m: at least sqrt(2 * 0.7 m / g) from each."""
     task = {"path": {"kind": "waypoints", "points": [[0, 0, 3], [0, 0, 2.1], [0, 0, 3]]}, "tube": {"position": 0.1}}

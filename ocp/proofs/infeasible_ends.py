@@ -230,6 +230,8 @@ def _hurried(
         for k, point in enumerate((np.zeros(3), np.array(robot.platform.com))):
             centres[k, kind] = spread[0, kind] + _reach(scenario, its, point[None])
         spread[0, kind] += _reach(scenario, its)
+    if scenario.duration_range is not None:
+        spread[0, 2], centres[:, 2] = np.inf, np.inf  # the planner may choose when the platform is where on its path
     if robot.fixed_lengths is not None:  # no carrier is farther from its attachments than its cables are long
         far = robot.fixed_lengths + np.linalg.norm(robot.anchors, axis=1) + LENGTH_TOLERANCE
         attachments = scenario.dynamics.points(platform.pose, carriers.pose)[1][order]
