@@ -547,7 +547,7 @@ def test_speed_without_a_limit_is_refused():
 
 @pytest.mark.parametrize(
     ("limits", "named"),
-    [({"winch_power": 1e-6}, "winch_power of cable 1"), ({"platform_speed": 1e-6}, "speed of platform")],
+    [({"winch_power": 1e-4}, "winch_power of cable 1"), ({"platform_speed": 1e-6}, "speed of platform")],
 )
 def test_a_limit_that_permits_only_a_motion_of_days_is_named(limits, named):
     """The power that lifts 2 kg by 1 m in 10^4 s is 2 mW."""
