@@ -123,6 +123,15 @@ def test_a_limit_that_time_laws_do_not_know_takes_the_shortest_duration_of_the_o
     assert not plan("cogiro", task | {"duration": 0.99 * found.duration}).feasible
 
 
+def test_a_limit_that_the_fastest_law_of_a_path_that_dwells_does_not_know_is_kept():
+    """That law, with its own audit, would take half as long."""
+    short = {"kind": "waypoints", "points": [[0, 0, 1], [0.3, 0, 1], [0.3, 0.3, 1]], "dwell": [0, 0.2, 0]}
+    made = plan("cogiro", {"path": short, "duration": RANGE, "limits": {"tension_rate": 3000.0}})
+    assert made.feasible
+    rates = np.gradient(made.trajectory["tensions"].values, made.trajectory["time"].values, axis=0)
+    assert np.abs(rates).max() < 3030.0
+
+
 def test_what_no_known_law_of_a_path_that_dwells_keeps_is_not_called_infeasible():
     planner = Planner("cogiro", {"path": STILL, "duration": RANGE, "limits": {"tension_rate": 1.0}})
     assert [planner.plan().status.value for _ in range(2)] == ["not-found"] * 2
