@@ -7,8 +7,8 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.text import counted
 from ...models.robot import Robot
-from ..logs.measurements import Measurements, measured, tracked
-from .balance import hangs
+from ..logs.measurements import Measurements, measured, measured_poses, tracked
+from .balance import Balance, hangs, needs_balance
 from .clock import CLOCK_RANGE, is_still, moves_smoothly, winds
 from .model import Model
 from .parameters import IN_BALANCE, Parameters
@@ -16,13 +16,29 @@ from .sightings import sighted
 
 
 def usual(robot: Robot, measurements: Measurements) -> tuple[str, ...]:
-    """Return the default free parameters: offsets, anchors if the readings change, the clock if motion was measured."""
+    """Return the default free parameters: offsets, anchors if the readings change, the clock if motion was measured.
+
+    Gravity at rest without measured positions tells the CoM in the place of the anchors: a wrong CoM would move these
+    far, and it is less certain in files.
+    """
     still = is_still(measurements)
     if still and measurements.carrier_poses is None:
         return ("offsets",)
+    if _rests_without_positions(robot, measurements):
+        return ("offsets", "com")
     groups = ("anchors", "offsets", "clock")
     known = measurements.times is not None and not still and is_enough(robot, measurements, ("clock",))
     return groups if known and winds(measurements) and moves_smoothly(robot, measurements) else groups[:-1]
+
+
+def _rests_without_positions(robot: Robot, measurements: Measurements) -> bool:
+    """Return whether gravity tells poses at rest, of which no positions were measured, and the CoM."""
+    moves = robot.dof_mask > 0
+    known = measured_poses(robot, measurements)[2][:, :3][:, moves[:3]].any()
+    if known or not moves[3:].any() or measurements.carrier_poses is not None:
+        return False
+    rests = needs_balance(robot, measurements) and Balance(robot, measurements).at_rest
+    return rests and is_enough(robot, measurements, ("offsets", "com"))
 
 
 def is_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ...]) -> bool:

@@ -18,6 +18,7 @@ from .hanging import slack
 from .left_out import SLACK, left_out
 from .parameters import GROUPS, IN_BALANCE
 from .result import CalibrationData, Parameter, apart
+from .solving import considered_of
 from .turning import turning
 
 MOST_LISTED = 12
@@ -97,7 +98,7 @@ def _of_held_out(result: CalibrationData) -> list[str]:
             f"validation samples are predicted equally well with only {', '.join(held_out.best)}: the other "
             "parameters do not help"
         )
-    elif held_out.after > 1.5 * fitted:
+    if held_out.after > 1.5 * fitted:
         lines.append(
             f"validation samples have larger residuals ({_mm(held_out.after)}) than training samples ({_mm(fitted)}): "
             "so many parameters require more samples"
@@ -150,7 +151,9 @@ def _of_noise(result: CalibrationData) -> list[str]:
         free = ",".join(name for name in GROUPS if name in (kept[0], *result.free))
         held = f"hold only if the file's {kept[0]} are exact"
         if kept[0] == "anchors" and result.measurements.carrier_poses is None:
-            size = "" if known else f" of {_mm(usual_error(result._solved.model))} (assumed)"
+            error = considered_of(result._solved).error
+            how = "assumed" if error <= usual_error(result._solved.model) else "as residuals show"
+            size = "" if known else f" of {_mm(error)} ({how})"
             held = f"include errors{size} of the file's anchors"
         lines.append(
             f"{why}the standard deviations below {held}; with --free {free} --prior {kept[0]}=0.02 they include errors "

@@ -41,9 +41,10 @@ def calibrate(
         free: Parameters to estimate (see docs/howto/calibrate.md): any of anchors, attachments, offsets, scales,
             radii, build-up, clock, frame, body, com and elasticity, and with tensions also mass, stiffness, capstan,
             friction, gains and zeros. Default: anchors and offsets, and the clock if times and poses of a motion were
-            measured. With anchors and offsets, towline adds attachments, scales, build-up and radii as far as they
-            explain errors that repeat with the pose. Or "auto": the smallest set whose cross-validation error is close
-            to the smallest one; this set may be empty.
+            measured; offsets and com at rest without positions, if gravity tells the CoM. With anchors and offsets,
+            towline adds attachments, scales, build-up and radii as far as they explain errors that repeat with the
+            pose. Or "auto": the smallest set whose cross-validation error is close to the smallest one; this set may be
+            empty.
         prior: Standard deviations of the file's values, in the units of the parameters, by the names of `free`, such as
             {"anchors": 0.02}. Default: no prior; unobservable directions change as little as possible.
         outliers: True to detect outliers, which are left out, and slipped winches, whose cable gets a new offset after

@@ -16,7 +16,7 @@ from .balance import Balance
 from .carrier_clocks import CarrierClocks, has_carrier_clocks, with_carrier_clocks
 from .carrier_motion import CarrierMotion
 from .clock import begin_with_clock
-from .considered import considered
+from .considered import Considered, considered
 from .fit import Fit, fit
 from .geometry import length_of
 from .hanging import carrying, without_slack
@@ -298,5 +298,11 @@ def covariance_of(solved: Solved) -> np.ndarray:
     """
     scale = metric(solved.model)[solved.model.parameters.varies]
     covariance = solved.noise.covariance / scale[:, None] / scale
-    covariance += considered(solved.model, solved.fit.state, solved.observability.inverse)
+    covariance += considered_of(solved).covariance
     return (covariance + covariance.T) / 2
+
+
+def considered_of(solved: Solved) -> Considered:
+    """Return what errors of fixed cable ends do to a fit."""
+    excess, redundancy = float(np.nan_to_num(solved.noise.excess)), solved.noise.redundancy
+    return considered(solved.model, solved.fit.state, solved.observability.inverse, excess, redundancy)
