@@ -7,8 +7,8 @@ from .correction import corrected
 from .cross_validation import Compared, HeldOut
 from .design import next_poses
 from .outliers import Outlier, Slip
+from .parameters import Parameter
 from .plausibility import Mistake, mistake
-from .result import Parameter
 from .run import calibrate
 
 __all__ = [

@@ -14,7 +14,7 @@ exp(capstan s) gain (y - zero) + friction s, and compliance is 1 / (E A).
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -46,6 +46,19 @@ STIFFEST = 1e-12  # [1/N]; less compliance is none
 IN_PLANE = 1e-9  # [m] out of it
 LARGEST_PRIOR = 1e3
 SMALLEST_PRIOR = 1e-9
+
+
+class Parameter(NamedTuple):
+    """One parameter: its name, value, standard deviation and change from the robot's file, all in `unit`.
+
+    Sigma is inf if the parameter is unobservable.
+    """
+
+    name: str
+    value: float
+    sigma: float
+    correction: float
+    unit: str
 
 
 @dataclass(frozen=True)

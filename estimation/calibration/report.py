@@ -16,8 +16,8 @@ from .file_errors import ENDS
 from .geometry import length_of
 from .hanging import slack
 from .left_out import SLACK, left_out
-from .parameters import GROUPS, IN_BALANCE
-from .result import CalibrationData, Parameter, apart
+from .parameters import GROUPS, IN_BALANCE, Parameter
+from .result import CalibrationData, apart
 from .solving import considered_of
 from .turning import turning
 
@@ -270,5 +270,6 @@ def _of_open(result: CalibrationData) -> list[Part]:
         lines.append(f"poorly determined: {_first(loose, MOST_NAMED)}; measure other poses, or give a prior")
     if not texts:
         return [*lines, "all directions of the parameters are observable"]
-    title = f"{counted(len(texts), 'unobservable direction')}, along which the file's values are kept:"
+    kept = "only the file tells the values" if result.unobserved else "the file's values are kept"
+    title = f"{counted(len(texts), 'unobservable direction')}, along which {kept}:"
     return [*lines, Section(title, [("", text) for text in texts])]

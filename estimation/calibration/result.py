@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +23,7 @@ from .file_errors import ENDS
 from .geometry import length_of
 from .load_changes import load_changes
 from .outliers import Outlier, Slip
-from .parameters import IN_BALANCE, Parameters
+from .parameters import IN_BALANCE, Parameter, Parameters
 from .plausibility import Mistake
 from .repeating_errors import Repeating
 from .solving import Noise, Solved, covariance_of, inflation_of, lengths_of
@@ -33,19 +33,6 @@ FAR = 5.0  # standard deviations of the prior
 FARTHEST = 0.5  # of the cables' length, by which an anchor or an attachment may be displaced
 MOST_LOST = 2.0  # times the standard deviation of the file, beyond which a calibrated end is worse than the file's
 MOST_WRONG = 1 / 3  # of the readings, beyond which a fit to the others means nothing
-
-
-class Parameter(NamedTuple):
-    """One parameter: its name, value, standard deviation and change from the robot's file, all in `unit`.
-
-    Sigma is inf if the parameter is unobservable.
-    """
-
-    name: str
-    value: float
-    sigma: float
-    correction: float
-    unit: str
 
 
 def apart(growth: float) -> str:
@@ -62,6 +49,7 @@ class CalibrationData(Displayed):
         prior: Standard deviations about the file's values, if given, or as large as errors of the file turn out to be.
         mistake: A probable input error of the log, such as cables in another order or degrees read as radians, or None.
         samples: Indices (k,) of those samples of a long log that were used, or None if all were.
+        unobserved: Names of directions that the log does not determine, where the file's anchors or attachments do.
     """
 
     _solved: Solved
@@ -69,6 +57,7 @@ class CalibrationData(Displayed):
     prior: Mapping[str, float]
     mistake: Mistake | None = None
     samples: np.ndarray | None = None
+    unobserved: tuple[str, ...] = ()
 
     def _picture(self) -> str:
         samples = np.arange(len(self.residuals))
@@ -265,8 +254,8 @@ class CalibrationData(Displayed):
 
     @property
     def not_identifiable(self) -> tuple[str, ...]:
-        """Return the unobservable directions of the parameters, one name for each."""
-        return self._solved.observability.open
+        """Return the directions of the parameters that are unobservable by the log, one name for each."""
+        return self.unobserved or self._solved.observability.open
 
     @cached_property
     def residuals(self) -> np.ndarray:

@@ -86,8 +86,9 @@ def calibrate(
                 "measurements.poses must be known throughout a motion to estimate elasticity without tensions, got "
                 f"{int(tracked(chosen, given).sum())} of {len(given)}: longer gaps and open ends hide accelerations"
             )
+    unobserved: tuple[str, ...] = ()
     if first == priors and not (found and found.severe) and (loosely := undetermined(solved)):
-        first = priors | loosely
+        first, unobserved = priors | loosely, solved.observability.open
         solved = solve(chosen, given, groups, first, outliers)
     if first != priors:
         priors = errors_of_file(solved, priors)
@@ -108,4 +109,4 @@ def calibrate(
         if not uses_slack(solved):
             break
         solved = solve(chosen, given, groups, priors, outliers, solved)
-    return Calibration(solved, groups, priors, found, samples)
+    return Calibration(solved, groups, priors, found, samples, unobserved)

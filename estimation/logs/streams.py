@@ -148,7 +148,7 @@ def complete_samples(values: np.ndarray, fields: Sequence[Field]) -> np.ndarray:
         row, column = (int(i) for i in np.argwhere(~finite)[0])
         raise InputError(
             f"{fields[column].full} must be a finite number at sample {row}, got {values[row, column]:g}; "
-            f"{quantity(int((~kept).sum()))} of {quantity(len(kept))} samples are incomplete, and at most "
+            f"{quantity(int((~kept).sum()))} of {quantity(len(finite))} samples are incomplete, and at most "
             f"{quantity(100 * MOST_PARTIAL)} % may have only some of their numbers"
         )
     return np.asarray(kept)
