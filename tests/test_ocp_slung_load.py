@@ -49,9 +49,13 @@ def test_the_least_time_is_that_of_the_quadrotors_acceleration():
     assert found.scenario.duration == pytest.approx(least, rel=0.01)
 
 
-def test_programs_of_one_unknown_end_soon():
-    """The Jacobian is nearly singular; with what IPOPT adds to it by default one program took 300 iterations."""
-    found = plan(slung(dof=["x", "y", "z"]), carried(60, time=3e-3))
+@pytest.mark.parametrize("steps", [40, 50, 70])
+def test_programs_of_one_unknown_end_soon(steps):
+    """The Jacobian is nearly singular; with what IPOPT adds to it by default one program took 300 iterations.
+
+    Of 18 such programs one or two still take more than 200, and rounding decides which.
+    """
+    found = plan(slung(dof=["x", "y", "z"]), carried(steps, time=3e-3))
     assert found.feasible, found.report()
     counts = [int(count) for stage in found.stages for count in re.findall(r"(\d+) iterations", stage.message)]
     assert len(counts) >= 1

@@ -255,7 +255,7 @@ class CalibrationData(Displayed):
     @property
     def not_identifiable(self) -> tuple[str, ...]:
         """Return the directions of the parameters that are unobservable by the log, one name for each."""
-        return self.unobserved or self._solved.observability.open
+        return tuple(dict.fromkeys((*self.unobserved, *self._solved.observability.open)))
 
     @cached_property
     def residuals(self) -> np.ndarray:
