@@ -231,9 +231,7 @@ class Balance:
         r = (A @ tensions[..., None])[..., 0] + wrench
         inner = A[:, rows] * self._scale[:, None]
         M = (inner * variances[:, None]) @ np.swapaxes(inner, 1, 2)
-        # Errors of accelerations grow with the mass, which is not known where gains are free, too.
-        heavy = robot.platform.mass if "gains" in of.groups else mass
-        accelerated = np.where(rows < 3, heavy, robot.platform.mass) * motion.sigma[:, None]  # its errors [N], (N, k)
+        accelerated = np.where(rows < 3, mass, robot.platform.mass) * motion.sigma[:, None]  # its errors [N], (N, k)
         own = self._log.lasting * (noise * OWN * robot.weight) ** 2 + accelerated**2
         M[:, np.arange(len(rows)), np.arange(len(rows))] += own
         finite = np.isfinite(M).all() and np.isfinite(r).all()
@@ -347,10 +345,9 @@ class Balance:
             return result
 
         reduced = reduce(raw), reduce(by_pose)
-        # Without the part of these errors, a smaller mass would make them smaller.
+        # Errors of accelerations grow with the mass. Without their part, a smaller mass would make them smaller.
         of_forces = np.swapaxes(inverse_root[..., rows < 3], 1, 2)
-        grows = np.where("gains" in of.groups, 0.0, mass) * np.square(of_log.sigma)[:, None, None]
-        growing = grows * (of_forces @ residuals[:, rows, None])
+        growing = mass * np.square(of_log.sigma)[:, None, None] * (of_forces @ residuals[:, rows, None])
         growing = np.swapaxes(of_forces, 1, 2) @ growing  # (N, k, 1)
         reduced[0][:, rows, of.clock + 1] -= growing[..., 0]
         if not carries:
