@@ -61,7 +61,7 @@ class ComputedTorque(Controller):
             `bandwidth` and `observer` are lowered, because the loop is unstable from 1 / b on. Both are restored after
             two steps that are closer together. A given bandwidth is kept, with a warning. If carriers fly, all
             bandwidths are lowered by the same factor, because their attitude loops need steps of at most 0.75 /
-            `attitude`, less 1.5 times the mean age of the states and 0.75 times what is left of `rotor_lag`. Other
+            `attitude`, less 1.5 times the mean age of the states and 0.75 times the remainder of `rotor_lag`. Other
             carriers that correct errors need steps of at most 0.75 / `carrier_bandwidth`.
         damping: Damping ratio z: Kd = 2 z b.
         integral: Ki [1/s^3], a number or one for each coordinate. It pauses while the status is not "as planned".

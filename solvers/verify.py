@@ -24,8 +24,8 @@ _NEAREST = "gives the wrench as near to t_ref as can be, which is not what the m
 class Verdict(NamedTuple):
     """Hold what is known of a problem after a proposal, in the fields of a `TensionSolution`.
 
-    `left` is the problem of what is left to choose on the boundary of the available wrench set, for another proposal;
-    `tensions` are then the least squares there. None if the verdict is final.
+    `left` is the problem of the tensions that remain free on the boundary of the available wrench set, for another
+    proposal; `tensions` are then the least squares there. None if the verdict is final.
     """
 
     status: Status
@@ -53,7 +53,7 @@ def verify(
 
     - `problem`, `form`: the problem, and the form of it that the method got.
     - `method`, `proposal`, `tensions`: the method, its proposal, and that in tensions [N], (m,).
-    - `exact`: the least squares [N], (m,), if the form contains only what is left to choose on the boundary; else None.
+    - `exact`: the least squares [N], (m,), if all tensions of the form remain free on the boundary; else None.
     - `last`: False if another form is left to try: then only what is accepted is judged, and None is returned
       otherwise.
     """

@@ -97,7 +97,7 @@ def considered(model: Model, state: State, inverse: np.ndarray, excess: float, r
 def _shown(T: np.ndarray, gradient: np.ndarray, cost: float, redundancy: float, least: float, most: float) -> float:
     """Return the most likely standard deviation of errors between `least` and `most`, all three in metres.
 
-    What errors of anchors do not explain of the sum of squares `cost` shows how large the noise is.
+    The part of the sum of squares `cost` that errors of anchors do not explain shows how large the noise is.
     """
     values, Q = np.linalg.eigh(T)
     seen = values > SEEN * values[-1]

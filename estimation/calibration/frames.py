@@ -145,7 +145,7 @@ def in_convention(log: LogPart, frames: Frames) -> tuple[Frames, Interpretation]
 
 
 def displaced_frames(log: LogPart, least: float, noise: float) -> tuple[Frames, float] | None:
-    """Return the frames near the file's that fit lengths best, and what is left without them [m].
+    """Return the frames near the file's that fit lengths best, and the residuals without them [m].
 
     None if that is not `least` times as much as with them, or as the noise.
     """

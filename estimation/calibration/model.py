@@ -153,7 +153,7 @@ class Model(Displayed):
             yield rows, self.part(rows), state.only(rows)
 
     def part(self, rows: np.ndarray | slice) -> Model:
-        """Return the model of some samples (k,) that rise, which count as they do in the whole log."""
+        """Return the model of some samples (k,) that rise, with the weights that they have in the whole log."""
         shared = ("size_is_open", "pulled_at_poses", "prior_sigmas", "kept_rows", "_in_plane")
         part, known = self.only(rows), {name: getattr(self, name) for name in shared}
         balanced = None if self.balanced is None else part.forces

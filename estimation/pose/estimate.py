@@ -18,7 +18,7 @@ from .parameter_errors import length_errors
 from .residual_tests import BLOCK, SINGULAR, residual_tests, squares_of
 
 FALSE_ALARM = 0.01  # share of sound measurements that count as inconsistent
-FALSE_ALARM_IN_LOG = 1e-4  # probability that any sample of a sound log counts as wrong
+FALSE_ALARM_IN_LOG = 1e-4  # probability that any sample of a sound log is called wrong
 EXACT = 1e-6  # standard deviations: errors where there are as many lengths as coordinates
 CHANGED = 1e-6  # share of a motion of unit length
 MOST_TURN = np.radians(5.0)  # standard deviation of an angle up to which the geometry is nearly linear

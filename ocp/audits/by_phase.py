@@ -72,7 +72,7 @@ def worst_certificate(scenario: Scenario, time: float, platform: Motion, carrier
 def taken_up(scenario: Scenario, times: np.ndarray) -> np.ndarray | None:
     """Return tensions (n, m) [N] to prefer in a motion that is given: linear in time on the ground, else zero.
 
-    Where a phase on the ground has no tensions at one end, the other end's are kept. None for a task without ground.
+    The other end's tensions are kept if a phase on the ground has none at one end. The result is None without ground.
     """
     if not scenario.phases.rest:
         return None

@@ -49,8 +49,8 @@ class Stages(Displayed):
         # The unknowns of a smooth scheme are in units of an interval's length.
         unit = (scenario.duration, mesh.steps) if scenario.scheme.smooth else ()
         # The layout says whether the duration is an unknown; which ones are allowed is a matter of bounds.
-        alike = scenario.task.model_copy(update={"duration": None})
-        same = layout, alike, id(scenario.limits), id(scenario.tightened), *map(id, thin)
+        undated = scenario.task.model_copy(update={"duration": None})
+        same = layout, undated, id(scenario.limits), id(scenario.tightened), *map(id, thin)
         key = *same, scenario.passing, mesh.elastic, mesh.between, *unit
         times = grid.shares * scenario.duration
         numbers = reference_motions(scenario, times), _carried(scenario, times)

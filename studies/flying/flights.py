@@ -1,6 +1,6 @@
 """Paper F's three motions, flown: the library's robot with its elastic cables, in the wind of figure 5.
 
-The plans are made by `plans`, without air. Each is flown three times: by the lengths of Eq. 5 without control
+The plans are made by `plans`, without air. Each is simulated three times: by the lengths of Eq. 5 without control
 (`wound`), by computed torque under a quadrotor that stays on its plan, and by computed torque under one that gives way
 to the wind by up to 0.5 m. The last two also fly the circle of radius 0.15 m under a hovering quadrotor. Where there is
 no wind the air rests, so a platform that flies straight at 10 m/s has drag without any.
