@@ -300,6 +300,10 @@ def test_long_rests_hide_neither_a_motion_nor_how_fast_it_is():
         assert moves[representative._blocks(log)].sum() > 1800
         spacings.append(representative._spacing(robot, log))
     assert spacings == [2, 1]
+    # Readings at half of the rate, interpolated at the times of another computer, vary little from one to the next.
+    lengths = 3 + 0.1 * np.sin(np.outer(times, [0.5, 0.7, 0.9, 1.1])) + draw.normal(0, 3e-4, (200_000, 4))
+    lengths[1:-1:2] = (lengths[:-2:2] + lengths[2::2]) / 2
+    assert representative._spacing(robot, Measurements(lengths, times=times, sigma={"lengths": 3e-4})) == 2
 
 
 def test_poses_between_samples_have_the_variance_of_poses_at_samples():
