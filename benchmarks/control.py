@@ -22,8 +22,19 @@ from ..control import ComputedTorque, Controller, OpenLoop, Predictive
 from ..models import Robot, load
 from ..simulation import simulate
 from ..solvers import Horizon
-from .acados import ACADOS
-from .control_contenders import CONTENDERS, FIELDS, REFERENCE, TOWLINE, Array, Contender, Program, condense, exact, fill
+from .control_contenders import (
+    ACADOS,
+    CONTENDERS,
+    FIELDS,
+    REFERENCE,
+    TOWLINE,
+    Array,
+    Contender,
+    Program,
+    condense,
+    exact,
+    fill,
+)
 from .harness import alternating, machine, ratio, table
 
 STANDARD = "computed torque"

@@ -25,9 +25,8 @@ from .options import (
     usual_file,
 )
 from .outputs import Outputs, check_outputs
-from .resuming import checkpoint_of, long_run, resumable
 from .stopping import add_to_message
-from .watching import counting, watching
+from .watching import checkpoint_of, counting, long_run, resumable, watching
 
 
 @parameters(f"""

@@ -12,7 +12,7 @@ from .options import FormatOption, JsonOption, parameters, print_json, print_wri
 from .watching import progress_bar
 
 if TYPE_CHECKING:
-    from ..studies.accounts.account import Account
+    from ..studies.accounts.claim import Account
 
 
 @parameters("""

@@ -33,9 +33,8 @@ from .options import (
     print_result,
 )
 from .outputs import Outputs, check_outputs
-from .resuming import checkpoint_of, long_run, resumable
 from .stopping import add_to_message
-from .watching import counting, watching
+from .watching import checkpoint_of, counting, long_run, resumable, watching
 
 if TYPE_CHECKING:
     import xarray as xr

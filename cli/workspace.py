@@ -11,9 +11,8 @@ from ..base.errors import InputError
 from ..base.inputs import check_ending
 from .options import JsonOption, RobotArgument, numbers, parameters, print_json, print_written
 from .outputs import check_outputs
-from .resuming import checkpoint_of, long_run, resumable
 from .stopping import add_to_message, requested
-from .watching import counting
+from .watching import checkpoint_of, counting, long_run, resumable
 
 if TYPE_CHECKING:
     import xarray as xr

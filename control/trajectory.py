@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from ..base.errors import InputError
 from ..base.inputs import file_path, finite_array, number, real_array, shown
 from ..base.netcdf import Contents, load_netcdf, numbers_of
-from ..figures.outlines import outlines_from
+from ..figures.scene import outlines_from
 from ..models.parsing import parse_yaml
 from ..models.part import LARGEST
 from ..models.rigid_load import RigidLoad

@@ -20,8 +20,7 @@ from ..solvers import Certificate, solve
 from ..statics.distribution import wrench_problem
 from ..statics.scene import scene_at
 from .impossibility import Impossibility
-from .judgement import Judgement
-from .reasons import Binding, Reasons
+from .judgement import Binding, Judgement, Reasons
 from .requirements import Requirements
 from .room import room_of
 

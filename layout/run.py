@@ -16,9 +16,8 @@ from .evaluation import NO_BOUNDS, Evaluation, rows_of, with_tasks
 from .goal import goal_of
 from .growth import grow
 from .impossibility import find_impossibility
-from .judgement import judge, judged_margin
+from .judgement import judge, judged_margin, reasons
 from .pairings import best_pairing, with_attachments
-from .reasons import reasons
 from .requirements import Free, Requirement, Requirements, read_requirements
 from .result import Design
 from .room import room_of

@@ -15,7 +15,7 @@ from ..models.dynamics import dynamics_of
 from ..models.files import AnyRobot, as_robot
 from ..models.record import FREE, IMPOSED, RESTS, record_of
 from . import layout
-from .packing import SETTINGS, command_rows, complete, given_or, leading_of, place
+from .layout import SETTINGS, command_rows, complete, given_or, leading_of, place
 from .reading import Reading, sensed
 
 DRIVES = {"lengths": layout.LENGTHS, "rates": layout.RATES, "forces": layout.FORCES, "tensions": layout.TENSIONS}
@@ -65,7 +65,7 @@ class Plant:
         robot: The `Robot`.
         size: Length of a state, n.
         record: The robot in the format of the numeric core, with the plant's stiffness and damping; read-only.
-        settings: Drive, contacts and bandwidths in the format of the numeric core, `packing.SETTINGS`.
+        settings: Drive, contacts and bandwidths in the format of the numeric core, `layout.SETTINGS`.
 
     Raises:
         InputError: If an argument has a wrong value, forces are commanded to cables without winches, or the robot has

@@ -15,7 +15,7 @@ from ..core import sense
 from ..models.robot import Robot
 from ..models.trajectory import moved_on
 from ..plant import Plant
-from ..plant.periods import Periods
+from ..plant.steps import Periods
 from .command_conversion import Orders
 from .events.event import Event, Running
 from .experiment import Experiment

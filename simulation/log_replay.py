@@ -191,7 +191,7 @@ class Replay(Drawn, Reported, Displayed):
 
     def figures(self) -> dict[str, Figure]:
         """Draw "replay": residuals over the recording, and those after fitting the best parameter."""
-        from ..figures.replay import replay as draw
+        from ..figures.flight import replay as draw
 
         after = self.explained or {}
         by = _words(self.found[0].name) if after else ""

@@ -15,8 +15,8 @@ from ..base.netcdf import Contents, Variable
 from ..base.text import at_most, quantity
 from ..control import ANSWERS
 from ..control.command import SOFT
-from ..figures.outlines import outline_variables
 from ..figures.report import Report, Reported, Section
+from ..figures.scene import outline_variables
 from ..models.motion_file import dimensions, motion_variables, over
 from ..models.parsing import to_yaml
 from ..models.robot import Robot

@@ -19,9 +19,8 @@ from ..estimation.logs.smoothing import noise_of, smooth, widest_parabola
 from ..models import points
 from ..models.dynamics import dynamics_of
 from ..plant import Plant, layout
-from ..plant.periods import Periods
 from ..plant.reading import sensed
-from ..plant.steps import steps_in
+from ..plant.steps import Periods, steps_in
 from .replayed_robot import Parameters, changed, friction_of, lags_of, modelled
 
 STEP = 2e-3  # [s] of the simulation

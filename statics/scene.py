@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.inputs import printable
-from ..figures.outlines import outlines_from
-from ..figures.scene import Scene
+from ..figures.scene import Scene, outlines_from
 from ..models.body import surface
 from ..models.dynamics import dynamics_of
 from ..models.points import placed

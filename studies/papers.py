@@ -4,7 +4,7 @@ from collections.abc import Callable
 from functools import partial
 from importlib import import_module
 
-from .accounts.account import Account, Paper, Progress, gather
+from .accounts.claim import Account, Paper, Progress, gather
 
 FLYING = "Q. Wang, H. Chen, Y. Su, L. Qiao: Coupling dynamics analysis of the flying cable driven parallel robot"
 TOWING = (

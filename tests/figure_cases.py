@@ -9,12 +9,12 @@ import numpy as np
 import xarray as xr
 
 from towline import load
-from towline.figures import calibration, flight, limits, phase_plane, plan, robot, sweep, workspace
-from towline.figures.convergence import convergence
+from towline.figures import calibration, flight, limits, plan, robot, sweep, workspace
 from towline.figures.curves import Panel, curve_in_space, curves
-from towline.figures.metric_map import metric_map
+from towline.figures.plan import convergence
 from towline.figures.scene import Scene
 from towline.figures.views import views
+from towline.figures.workspace import metric_map
 from towline.statics.scene import scene_at
 from towline.studies.flying.pairing import from_above
 
@@ -279,7 +279,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "sweep-3": lambda: swept((6, 8, 4)),
     "projections": lambda: workspace.projections({"W1": _ball(500, 1.0), "W2": _ball(500, 0.5)}, 2 * SQUARE),
     "cross-sections": lambda: workspace.cross_sections(_ball(3000, 1.0), [-0.5, 0.0, 0.5], 0.02),
-    "law": lambda: phase_plane.phase_plane(
+    "law": lambda: plan.phase_plane(
         np.linspace(0, 1, 21),
         np.sqrt(np.minimum(np.linspace(0, 20, 21), np.linspace(20, 0, 21))),
         [(0.0, 0.4, "t_max of cables 2, 5"), (0.4, 0.6, "speed of platform"), (0.6, 1.0, "t_max of cables 2, 5")],

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from towline import Robot, load, plan
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.statics.scene import rotor_discs, scene
-from towline.viewer.shapes import rotors
+from towline.viewer.geometry import rotors
 
 QUAD = {
     "kind": "quadrotor",

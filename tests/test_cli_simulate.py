@@ -12,7 +12,7 @@ from towline import plan
 from towline.base.errors import InputError
 from towline.cli import stopping
 from towline.cli.main import app
-from towline.cli.resuming import resumable
+from towline.cli.watching import resumable
 from towline.simulation.flights import report
 
 from .warm import towline as run

@@ -7,8 +7,8 @@ from towline import Dynamics, InputError, Robot, TensionProblem, design, load, r
 from towline.layout import judgement
 from towline.layout.evaluation import Evaluation, rows_of
 from towline.layout.goal import goal_of
+from towline.layout.judgement import reasons
 from towline.layout.linear_programs import maximise, merit
-from towline.layout.reasons import reasons
 from towline.layout.room import room_of
 from towline.layout.variables import variables_of
 from towline.solvers import certify

@@ -9,8 +9,7 @@ import pytest
 
 import towline
 from towline import Robot, available, load, solve_batch
-from towline.export.step.costs import costs
-from towline.export.step.export import mechanics, moving_carriers, step_files
+from towline.export.step.export import costs, mechanics, moving_carriers, step_files
 from towline.models import Dynamics
 from towline.models.tape_c import operations
 from towline.solvers.status import STATUSES

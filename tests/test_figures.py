@@ -11,8 +11,8 @@ from matplotlib.colors import to_rgb
 from towline import InputError
 from towline.figures import limits, style, sweep
 from towline.figures.curves import Panel, curves
-from towline.figures.end_labels import together
-from towline.figures.metric_map import metric_map
+from towline.figures.style import together
+from towline.figures.workspace import metric_map
 
 from .figure_cases import FIGURES
 from .legible import COLUMN_MM, LEAST_STEP, check_grey, check_size, check_texts, lightness, renderer_of

@@ -9,7 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
 from towline import simulate
-from towline.figures import end_labels, flight
+from towline.figures import flight, style
 
 TIME = np.arange(0, 2, 0.01)
 ANSWERS = ["as_planned", "shifted_plan", "soft_wrench", "hold"]
@@ -96,10 +96,10 @@ def test_tensions_show_slack_limits_and_commands_that_differ():
 
 @pytest.mark.parametrize("ends", [[1, 1, 1, 1], [0, 0.01, 0.02, 0.9], [0.5, 0.5, 0.5, 0.51], np.linspace(0, 1, 8)])
 def test_names_beside_curves_are_apart_and_inside(ends):
-    places = end_labels._spread(np.array(ends, dtype=float))
-    assert (np.diff(places) >= end_labels.GAP - 1e-12).all()
+    places = style._spread(np.array(ends, dtype=float))
+    assert (np.diff(places) >= style.GAP - 1e-12).all()
     assert places[0] >= -1e-12
-    assert places[-1] <= end_labels.HIGHEST + 1e-12
+    assert places[-1] <= style.HIGHEST + 1e-12
 
 
 @pytest.mark.parametrize("draw", [flight.flight, flight.tensions])

@@ -8,9 +8,10 @@ from matplotlib.colors import to_hex
 from matplotlib.text import Text
 
 from towline import Robot, available, load
-from towline.figures import projection, style
 from towline.figures import robot as figure
+from towline.figures import style
 from towline.figures.hull import faces, outline
+from towline.figures.views import ABOVE, FRONT, SIDE, views_of
 from towline.statics.scene import scene_at
 
 
@@ -75,8 +76,8 @@ def test_flat_bodies_lines_and_points():
 
 def test_views_have_what_they_show_in_their_middle():
     points = np.random.default_rng(0).uniform([5, -3, 1], [9, -2, 4], (30, 3))
-    views = [projection.ABOVE, projection.FRONT, projection.SIDE]
-    _, panels = projection.views_of(points, views)
+    views = [ABOVE, FRONT, SIDE]
+    _, panels = views_of(points, views)
     for ax, view in zip(panels, views, strict=True):
         for limits, axis in ((ax.get_xlim(), view.across), (ax.get_ylim(), view.up)):
             low, high = points[:, axis].min(), points[:, axis].max()

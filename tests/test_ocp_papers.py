@@ -46,7 +46,7 @@ def test_paper_f_motions_are_planned(name):
 
 
 def test_the_helix_is_impossible_on_the_straight_line():
-    task = flying_plans.helix()
+    task = flying_plans.helix_task()
     paths = {"quad": task.base.around["quad"]}
     found = plan(load("wang-flying"), {**task.model_dump(mode="json"), "base": {"kind": "given", "paths": paths}})
     assert found.status == "infeasible"

@@ -10,8 +10,7 @@ from towline.figures import page as html
 from towline.figures import style
 from towline.figures.drawing import Drawing
 from towline.studies.accounts import files as accounts
-from towline.studies.accounts.account import Account, Chapter, Paper
-from towline.studies.accounts.claim import Claim, Verdict
+from towline.studies.accounts.claim import Account, Chapter, Claim, Paper, Verdict
 
 from .chromium import chromium, watched
 

@@ -15,8 +15,8 @@ from rich.console import Console
 
 from towline.base.errors import InputError, TowlineError
 from towline.cli.watching import watching
-from towline.figures import animation, film, style
-from towline.figures.convergence import convergence, runs
+from towline.figures import animation, style
+from towline.figures.plan import convergence, runs
 from towline.figures.style import typeset
 from towline.figures.views import views
 from towline.models import Dynamics, load
@@ -378,7 +378,7 @@ def test_a_broken_ffmpeg_is_one_line_and_leaves_no_file(tmp_path, monkeypatch):
     broken.chmod(0o755)
     monkeypatch.setitem(mpl.rcParams, "animation.ffmpeg_path", str(broken))
     with pytest.raises(TowlineError, match=r"ffmpeg: stopped with exit code 3 \(no such codec\)"):
-        film.write(tmp_path / "film.mp4", lambda k: np.zeros((520, 700, 3), np.uint8), 50, 25)
+        animation.write(tmp_path / "film.mp4", lambda k: np.zeros((520, 700, 3), np.uint8), 50, 25)
     assert [path.name for path in tmp_path.iterdir()] == ["ffmpeg"]
 
 

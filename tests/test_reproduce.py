@@ -14,8 +14,7 @@ from towline.base.errors import SolverError
 from towline.figures import style
 from towline.figures.drawing import Drawing
 from towline.models import Dynamics, load
-from towline.studies.accounts.account import Chapter, Paper, gather
-from towline.studies.accounts.claim import Statement, Verdict, statements, value_text
+from towline.studies.accounts.claim import Chapter, Paper, Statement, Verdict, gather, statements, value_text
 from towline.studies.accounts.files import errata, page, write
 from towline.studies.flying import (
     balance,
@@ -23,8 +22,6 @@ from towline.studies.flying import (
     disturbance,
     element,
     helix,
-    instants,
-    motion,
     pairing,
     parameters,
     plans,
@@ -227,7 +224,7 @@ def test_other_printed_values_change_the_verdict(monkeypatch):
 
 def test_rates_and_accelerations_by_differences():
     """The derivatives that the equations are held against, by scipy's rotations at three instants."""
-    samples = instants.instants()
+    samples = rotations.instants()
     step = 1e-4
     angles, rates, bends = (part[:, 3:] for part in samples.base)
     before, now, after = (
@@ -245,8 +242,8 @@ def test_the_missing_newtons_of_the_helix(claims):
     from scipy.optimize import nnls
 
     dynamics = Dynamics(load("wang-flying"))
-    turn = motion.circle(1.0)
-    tensions = motion.steady_tensions(dynamics, turn)
+    turn = plans.circle(1.0)
+    tensions = plans.steady_tensions(dynamics, turn)
     row = tensions.min(axis=1).argmin()
     scale = np.r_[np.ones(3), np.full(3, 1 / dynamics.robot.length)]
     A = dynamics.relative.wrench_matrix(turn.pose[row]) * scale[:, None]
@@ -261,7 +258,7 @@ def test_largest_radius_by_the_tensions_themselves():
     dynamics = Dynamics(load("wang-flying"))
     for floor in (0.0, 0.5):
         largest = radius.largest_radius(dynamics, floor)
-        smallest = motion.steady_tensions(dynamics, motion.circle(largest)).min()
+        smallest = plans.steady_tensions(dynamics, plans.circle(largest)).min()
         assert smallest == pytest.approx(floor, abs=2e-3)
     assert radius.largest_radius(dynamics) == pytest.approx(0.234, abs=0.001)
     assert not radius.feasible(dynamics, 1.0, 0.0)
@@ -272,7 +269,7 @@ def test_the_printed_ratio_is_that_of_the_computed_amplitude():
     amplitude = vibration.amplitude_of(robot, vibration.RATIO)
     shaken = vibration.forces(robot, amplitude)
     # T is what the platform needs less what the vibration adds
-    steady = motion.steady_tensions(Dynamics(robot), motion.circle(motion.FEASIBLE))
+    steady = plans.steady_tensions(Dynamics(robot), plans.circle(plans.FEASIBLE))
     np.testing.assert_allclose(shaken.T + shaken.dT, steady, atol=1e-9)
     assert np.abs(shaken.dT[:, 0] / (steady - shaken.dT)[:, 0]).max() == pytest.approx(0.1247, rel=1e-3)
     assert amplitude == pytest.approx(1.9e-6, rel=0.05)
@@ -281,11 +278,11 @@ def test_the_printed_ratio_is_that_of_the_computed_amplitude():
 def test_a_pitching_quadrotor_by_newton_and_euler(claims):
     """Relative error of cable 1 again, from the form in {G}."""
     dynamics = Dynamics(load("wang-flying"))
-    body, base = motion.circle(motion.FEASIBLE), disturbance.flown(plans.PITCH)
+    body, base = plans.circle(plans.FEASIBLE), disturbance.flown(plans.PITCH)
     world = dynamics.relative.motion_in_world(*body, *base)
     A = dynamics.wrench_matrix(world[0], base.pose[:, None])
     felt = np.linalg.solve(A, dynamics.required_wrench(*world)[..., None])[:, 0, 0]
-    still = motion.steady_tensions(dynamics, body)[:, 0]
+    still = plans.steady_tensions(dynamics, body)[:, 0]
     worst = 100 * np.abs((still - felt) / felt).max()
     assert claims["fig-15"].computed == pytest.approx(worst, rel=1e-6)
 

@@ -15,7 +15,7 @@ from towline.cli.main import app
 from towline.figures import style
 from towline.models import Dynamics, load
 from towline.studies.accounts.claim import Verdict
-from towline.studies.flying import flights, motion, plans, shaken, wind
+from towline.studies.flying import flights, plans, shaken, wind
 from towline.studies.flying.wound import FLIGHT, PERIOD
 from towline.studies.papers import FLYING
 from towline.studies.towing import flights as towed
@@ -182,8 +182,8 @@ def test_the_wind_of_figure_5_changes_the_tensions_by_its_force(robot, circle):
 
 
 def test_wind_is_that_of_the_figure(robot):
-    drawn = wind.trapezoid(motion.TIMES, wind.PEAK, noise=wind.NOISE)
-    np.testing.assert_array_equal(flights.gust(motion.TIMES, 0), drawn)
+    drawn = wind.trapezoid(plans.TIMES, wind.PEAK, noise=wind.NOISE)
+    np.testing.assert_array_equal(flights.gust(plans.TIMES, 0), drawn)
 
 
 def test_a_flight_has_drag_without_wind(robot):
@@ -193,7 +193,7 @@ def test_a_flight_has_drag_without_wind(robot):
     velocity = np.column_stack([6 - 0.2 * np.pi * np.sin(turn), 5 + 0.2 * np.pi * np.cos(turn)])
     largest = (0.5 * 1.29 * 0.45 * 0.16 * np.linalg.norm(velocity**2, axis=1)).max()
     reference = flights.read_trajectory(robot, plans.planned("helix"), None).at(FLIGHT)
-    body, carriers = (motion.Motion(*part) for part in reference)
+    body, carriers = (plans.Motion(*part) for part in reference)
     claim = flights._own_drag(robot, flights.Flown(None, None, None, None, body, carriers))
     assert claim.computed == pytest.approx(largest, rel=1e-3)
     assert claim.verdict is Verdict.DIFFERS
@@ -219,7 +219,7 @@ def test_no_tensions_hold_the_platform_where_the_quadrotor_hovers(robot, hoverin
     claim = flights._stability(*hovering)
     assert claim.verdict is Verdict.NOT_DETERMINED  # "stable" is not defined, and may be the quadrotor's own motion
     rows = np.arange(0, 10_000, 100)
-    body = motion.circle(motion.FEASIBLE, FLIGHT[rows])
+    body = plans.circle(plans.FEASIBLE, FLIGHT[rows])
     units, arms = pulls(robot, body.pose, np.zeros((len(rows), 1, 6)))
     A = np.concatenate([units, np.cross(arms, units.transpose(0, 2, 1)).transpose(0, 2, 1)], axis=1)
     force = robot.platform.mass * (body.acceleration[:, :3] - GRAVITY)
@@ -245,7 +245,7 @@ def test_no_tensions_hold_the_platform_where_the_quadrotor_hovers(robot, hoverin
 
 def test_what_a_vibration_adds_to_tensions_by_newton_and_euler(robot, seen):
     """A dT = M ddx - f, of the motion that the plant computed; the cables turn too little to matter."""
-    dynamics, body = Dynamics(robot), motion.circle(motion.FEASIBLE, shaken.SHAKEN)
+    dynamics, body = Dynamics(robot), plans.circle(plans.FEASIBLE, shaken.SHAKEN)
     times = shaken.SHAKEN
     middle = times - PERIOD / 2  # forces are held: at an instant, the mean of two
     force = 0.1 * np.sin(2 * np.pi * np.outer(middle, [5, 6, 7]) + [0, 1, 2])

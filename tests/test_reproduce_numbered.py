@@ -11,16 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from towline.models import load
 from towline.studies.accounts.claim import Verdict
-from towline.studies.flying import (
-    balance,
-    element,
-    every_pairing,
-    instants,
-    references,
-    rotations,
-    structure,
-    vibration,
-)
+from towline.studies.flying import balance, element, every_pairing, references, rotations, structure, vibration
 from towline.studies.flying import procedure as steps_of_f
 from towline.studies.flying import radius as largest
 from towline.studies.towing import equations, loop, ranges, tensions
@@ -109,7 +100,7 @@ def test_figures_are_legible_in_a_column(chapters_of_f, chapters_of_c):
 
 @pytest.fixture(scope="module")
 def samples():
-    return instants.instants()
+    return rotations.instants()
 
 
 def spun(samples, step):
@@ -258,7 +249,7 @@ def test_angular_momentum_by_differences(flying, samples):
     """Eq. 29 holds, and Eq. 33 is off by what stands for omega_A x R I_b Omega in it: Omega x R I_b Omega."""
     change, (omega_A, Omega), R_B, inertia = momenta(samples)
     np.testing.assert_allclose(
-        instants.turn_back(samples.R_A.R, balance.newton_euler(balance.Dynamics("wang-flying"), samples)[:, 3:]),
+        rotations.turn_back(samples.R_A.R, balance.newton_euler(balance.Dynamics("wang-flying"), samples)[:, 3:]),
         change,
         atol=1e-4,
     )

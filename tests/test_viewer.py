@@ -25,12 +25,11 @@ from towline.models import Dynamics, load
 from towline.ocp import plan
 from towline.viewer import read, save_page, serve
 from towline.viewer.access import refusal
-from towline.viewer.cloud import cloud
-from towline.viewer.geometry import Geometry
+from towline.viewer.geometry import Geometry, posts, sheaves
 from towline.viewer.labels import readout
-from towline.viewer.shapes import posts, sheaves
 from towline.viewer.sliders import sliders
 from towline.viewer.snapshot import arrow, at_rest
+from towline.viewer.subject import cloud
 from towline.workspace import StaticEquilibrium, sample, save
 
 from .viewer_wire import Wire

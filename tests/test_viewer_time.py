@@ -17,7 +17,7 @@ from towline.models import load
 from towline.ocp import plan
 from towline.statics.scene import scene
 from towline.viewer import read, serve
-from towline.viewer.curves import Curves, curves
+from towline.viewer.charts import Curves, curves
 from towline.viewer.replay import Replay
 
 from .viewer_wire import Wire

@@ -4,8 +4,8 @@
     save_page(subject, "circle.html")
     with serve(subject) as url: ...
 
-The modules `snapshot`, `replay`, `curves`, `cloud`, `sliders`, `feasible_ranges` and `labels` compute what is shown,
-without a browser. Only `server` imports viser, which draws it (extra `viewer`).
+The modules `snapshot`, `replay`, `subject`, `charts`, `sliders` and `labels` compute what is shown, without a
+browser. Only `server` imports viser, which draws it (extra `viewer`).
 """
 
 from .server import save_page, serve

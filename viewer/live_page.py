@@ -21,8 +21,8 @@ from ..figures.tension_colours import NO_TENSION, rgb, shades
 from ..models import Robot
 from ..models.body import surface
 from ..models.record import record_of
+from .geometry import posts, rotors
 from .posing import few_cables, opening_pose
-from .shapes import posts, rotors
 from .sliders import sliders
 from .subject import Subject
 

@@ -16,11 +16,10 @@ from ..models import Dynamics, Robot, points
 from ..statics.rest_near import rest_near
 from ..workspace import StaticEquilibrium
 from ..workspace.nearest import nearest_feasible
-from .feasible_ranges import Strips
 from .frames import Frames
 from .geometry import Geometry
 from .labels import link
-from .sliders import Slider, sliders
+from .sliders import Slider, Strips, sliders
 from .snapshot import Show, at_rest
 from .stage import move
 

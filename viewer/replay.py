@@ -10,7 +10,7 @@ import xarray as xr
 from ..base.errors import InputError
 from ..base.inputs import printable
 from ..base.netcdf import numbers_of
-from ..figures.outlines import outlines_from
+from ..figures.scene import outlines_from
 from ..models import Robot
 from ..models.parsing import parse_yaml
 from ..ocp import Task

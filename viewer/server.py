@@ -20,8 +20,8 @@ from ..figures.perspective import ALONG
 from .access import guarded
 from .frames import Frames, with_script
 from .live_page import live_page
-from .live_view import Live
 from .page import aside, camera
+from .panel import Live
 from .replay import Replay
 from .stage import Stage
 from .subject import Subject

@@ -18,8 +18,7 @@ from ..figures.robot import box_edges, drawn_ends
 from ..figures.tension_colours import place, rgb, shades
 from ..models.body import surface
 from . import labels
-from .geometry import FIELD_OF_VIEW, Extent
-from .shapes import posts, rotors, sheaves
+from .geometry import FIELD_OF_VIEW, Extent, posts, rotors, sheaves
 from .snapshot import Snapshot, arrow
 from .subject import Subject
 

@@ -5,21 +5,37 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
 from ..base.declared import check_zarr
 from ..base.display import Displayed
 from ..base.errors import InputError
 from ..base.inputs import file_path, printable, required, shown
-from ..base.netcdf import load_netcdf
+from ..base.netcdf import load_netcdf, numbers_of
+from ..base.text import quantity
+from ..figures import style
+from ..figures.tension_colours import rgb
 from ..models import Robot, available, load
-from .cloud import Cloud, cloud
-from .geometry import Geometry
+from .geometry import FARTHEST, Geometry
 from .replay import Replay
 from .snapshot import Snapshot
 
 HDF5 = b"\x89HDF\r\n\x1a\n"  # how NetCDF files begin
-ACCEPTED = "a robot, or a file that `towline plan`, `towline simulate` or `towline workspace` wrote"
+READABLE = "a robot, or a file that `towline plan`, `towline simulate` or `towline workspace` wrote"
+MOST_POINTS = 10_000  # more hide the robot among them
+ACCEPTED, REFUSED = style.colour(2), style.colour(5)  # bluish green and orange: colours that do not need colour vision
+
+
+@dataclass(frozen=True)
+class Cloud(Displayed):
+    """Coloured points in {G}."""
+
+    positions: np.ndarray  # (n, 3) [m]
+    colours: np.ndarray  # bytes (n, 3)
+    legend: list[tuple[str, str]]  # (name, colour) pairs
+    summary: str  # the number of points, as a sentence
+    dataset: xr.Dataset  # source dataset
 
 
 @dataclass(frozen=True)
@@ -84,7 +100,7 @@ def read(
     Raises:
         InputError: If it is none of these, or belongs to another robot.
     """
-    path = file_path("target", target, ACCEPTED)
+    path = file_path("target", target, READABLE)
     if other is not None:
         beside = file_path("other", other, "the file of a plan or a simulation, or None")
         return _compared(read(path, robot), read(beside), printable(str(beside)))
@@ -119,7 +135,7 @@ def _of_dataset(dataset: xr.Dataset, where: str, robot: str | None) -> Subject:
         replay = Replay(dataset, where)
         return Subject(replay.title, replay.robot, replay=replay)
     if "reached" not in dataset and "position" not in dataset:
-        raise InputError(f"{where} must be {ACCEPTED}, got a dataset that is neither a plan nor a workspace")
+        raise InputError(f"{where} must be {READABLE}, got a dataset that is neither a plan nor a workspace")
     name = printable(str(dataset.attrs.get("robot")), 64)
     # A workspace names its robot: as a path, the name would make this program read any file.
     if robot is None and name not in available():
@@ -142,10 +158,10 @@ def _is_netcdf(path: Path) -> bool:
 
 def _open(path: Path) -> xr.Dataset:
     if not path.exists():
-        raise InputError(f"{printable(str(path))} does not exist; it must be {ACCEPTED}")
+        raise InputError(f"{printable(str(path))} does not exist; it must be {READABLE}")
     if path.is_dir() and path.suffix != ".zarr":
-        raise InputError(f"{printable(str(path))} must be {ACCEPTED}, got a folder")
-    refusal = f"{printable(str(path))} must be {ACCEPTED}, got a file that cannot be read"
+        raise InputError(f"{printable(str(path))} must be {READABLE}, got a folder")
+    refusal = f"{printable(str(path))} must be {READABLE}, got a file that cannot be read"
     if path.suffix != ".zarr":
         return load_netcdf(path, refusal)
     try:
@@ -157,3 +173,51 @@ def _open(path: Path) -> xr.Dataset:
         ) from None
     except Exception as error:  # a damaged folder may fail at any place of two libraries
         raise InputError(f"{refusal} ({printable((str(error) or 'empty').splitlines()[0])})") from None
+
+
+def cloud(dataset: xr.Dataset, where: str) -> Cloud:
+    """Return the points of a dataset of `workspace.sample`; with `keep="none"`, the centres of the reached cells.
+
+    Raises `InputError` if the dataset has no such points.
+    """
+    if "position" not in dataset:
+        return _cells(dataset, where)
+    positions = _places(dataset, "position", (-1, 3), where)
+    accepted = (
+        dataset["accepted"].to_numpy().astype(bool) if "accepted" in dataset else np.ones(len(positions), dtype=bool)
+    )
+    if accepted.shape != positions.shape[:1]:
+        raise InputError(f"{where}: accepted must be one flag for each position, got the shape {accepted.shape}")
+    shown = slice(None, None, max(-(-len(positions) // MOST_POINTS), 1))
+    positions, accepted = positions[shown], accepted[shown]
+    colours = np.where(accepted[:, None], rgb(ACCEPTED), rgb(REFUSED)).astype(np.uint8)
+    legend = [("accepted", ACCEPTED)] + ([] if accepted.all() else [("not accepted", REFUSED)])
+    kept, tried = (_count(dataset, name) for name in ("accepted", "samples"))
+    summary = f"{kept} of {tried} samples accepted, {len(positions)} points shown"
+    return Cloud(positions, colours, legend, summary, dataset)
+
+
+def _count(dataset: xr.Dataset, name: str) -> str:
+    """Return a count among the attributes of a file as text, "?" for anything that is not a number."""
+    value = dataset.attrs.get(name)
+    return quantity(int(value)) if isinstance(value, int | np.integer) else "?"
+
+
+def _places(dataset: xr.Dataset, name: str, shape: tuple[int, ...], where: str) -> np.ndarray:
+    """Return a variable of positions; raise InputError unless all of them can be drawn."""
+    positions = numbers_of(dataset, name, shape, where, gaps=True, largest=np.inf)
+    wrong = ~(np.abs(positions) <= FARTHEST)
+    if wrong.any():
+        raise InputError(f"{where}: positions must be within {FARTHEST:g} m, got {positions[wrong][0]:g}")
+    return positions
+
+
+def _cells(dataset: xr.Dataset, where: str) -> Cloud:
+    if "reached" not in dataset or dataset["reached"].dims != ("x", "y", "z"):
+        raise InputError(f"{where} must be a file written by `towline workspace`, got one without positions and cells")
+    cells = np.argwhere(numbers_of(dataset, "reached", (-1, -1, -1), where) > 0)
+    axes = [_places(dataset, name, (-1,), where) for name in ("x", "y", "z")]
+    positions = np.stack([axis[column] for axis, column in zip(axes, cells.T, strict=True)], axis=1)
+    colours = np.tile(np.array(rgb(ACCEPTED), np.uint8), (len(positions), 1))
+    summary = f"{len(positions)} cells with accepted samples, shown by their centres"
+    return Cloud(positions, colours, [("accepted in this cell", ACCEPTED)], summary, dataset)

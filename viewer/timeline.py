@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..figures import style
-from .charts import Charts
-from .curves import curves
+from .charts import Charts, curves
 from .frames import Frames
 from .replay import Replay
 from .snapshot import Show

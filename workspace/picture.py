@@ -26,8 +26,7 @@ def draw(result: xr.Dataset, robot: AnyRobot | None = None) -> Figure:
     """
     import xarray as xr
 
-    from ..figures.metric_map import metric_map
-    from ..figures.workspace import reached
+    from ..figures.workspace import metric_map, reached
 
     required("result", result, xr.Dataset)
     if "reached" not in result:

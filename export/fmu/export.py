@@ -1,4 +1,4 @@
-"""`export_fmu`: write a robot as a functional mock-up unit."""
+"""`export_fmu`: write a robot as a functional mock-up unit, with robot.c, its record of sources/unit.h at the start."""
 
 import hashlib
 import os
@@ -9,7 +9,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import textwrap
 import zipfile
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,19 +19,22 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.inputs import check_ending, file_path, one_of, printable
+from ...base.version import __version__
 from ...base.writing import check_writable, whole_file
+from ...control.computed_torque import ComputedTorque
+from ...control.fallback import CARRIED
 from ...control.planned_references import references_at
+from ...control.state import Reference, State
 from ...control.trajectory import read_trajectory
 from ...core import MOST_CABLES
 from ...models.files import AnyRobot, as_robot
+from ...models.record import record_of
 from ...models.robot import Robot
 from ...plant import Plant
 from ...plant.plant import DRIVES
-from ...plant.steps import default_drive
-from .data import robot_c
-from .description import build_description, model_description
-from .start import PERIOD, data_at
-from .variables import PARTS, variables_of
+from ...plant.reading import sensed
+from ...plant.steps import ANGLE, default_drive, fastest_motion, winding_time
+from .variables import PARTS, Variable, build_description, model_description, variables_of
 
 _CORE = Path(__file__).parents[2] / "core"
 _OWN = Path(__file__).parent / "sources"
@@ -45,6 +50,10 @@ _FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapp
 _SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
 _ABOUT = {"plant": "Plant", "controller": "Controller", "both": "Plant with its controller,"}
 _MACHINES = {"amd64": "x86_64", "arm64": "aarch64"}
+_TEMPLATE = Path(__file__).parent / "sources" / "robot.c.in"
+_FLAT = ("inertia", "inverse_inertia")  # matrices that are one row in C
+PERIOD = 1e-3  # [s], of `simulate`
+LONGEST = 1e9  # [s]: what is as good as infinity
 
 
 def export_fmu(
@@ -149,3 +158,110 @@ def _binary(contents: dict[str, bytes], identifier: str) -> tuple[str, dict[str,
             reason = next((line for line in said if "error" in line), f"it ended with exit code {done.returncode}")
             raise InputError(f"CC must be a C compiler, got {printable(shlex.join(command))}: {printable(reason)}")
         return f"{machine}-{system}", {f"binaries/{machine}-{system}/{made.name}": made.read_bytes()}
+
+
+def robot_c(data: Mapping[str, Any], variables: Sequence[Variable], most: int) -> str:
+    """Return robot.c, from the members of `towline_unit`; all files are to be compiled for as many cables as `most`."""
+    lines = [f".{name} = {_value(name, value)}," for name, value in data.items()]
+    wrapped = (part for line in lines for part in textwrap.wrap(line, 116, break_long_words=False))
+    values = {"version": __version__, "cables": str(len(data["little"])), "most": str(most)}
+    values |= {"start": "\n".join(f"    {line}" for line in wrapped)}
+    values |= {"variables": "\n".join(f"    {_entry(variable)}," for variable in variables)}
+    return re.sub(r"@(\w+)@", lambda match: values[match[1]], _TEMPLATE.read_text(encoding="utf-8"))
+
+
+def _entry(variable: Variable) -> str:
+    """Return the entry of a variable in the table of their places."""
+    how = "UNIT_READ" if variable.causality in ("output", "independent") else "UNIT_FINITE"
+    how, least = ("UNIT_ANY", "0") if np.isnan(variable.least) else (how, _number(variable.least))
+    return f"{{offsetof(towline_unit, {variable.place}), {how}, {least}}}"
+
+
+def _value(name: str, value: Any) -> str:
+    """Return the initialiser of a member: numbers, records and arrays of both, which zeros may end."""
+    if isinstance(value, str):
+        return f'"{value}"'
+    array = np.asarray(value)
+    if array.dtype.names and array.ndim == 0:
+        kept = [f".{part} = {_value(part, array[part])}" for part in array.dtype.names if _is_set(array[part])]
+    elif array.ndim == 0:
+        return repr(int(array)) if array.dtype.kind in "bi" else _number(float(array))
+    else:
+        rows = list(array.ravel() if name in _FLAT else array)
+        while rows and not _is_set(rows[-1]):
+            rows.pop()
+        kept = [_value("", row) for row in rows]
+    return f"{{{', '.join(kept) or '0'}}}"
+
+
+def _is_set(value: Any) -> bool:
+    return bool(np.asarray(value).tobytes().strip(b"\0"))
+
+
+def _number(value: float) -> str:
+    return {"inf": "INFINITY", "-inf": "-INFINITY", "nan": "NAN"}.get(repr(value), repr(value))
+
+
+class _Exported(ComputedTorque):
+    """A controller whose settings can be read."""
+
+    def data(self) -> dict[str, Any]:
+        """Return the members of `towline_unit` that describe it."""
+        low_high = self._boxes or [np.full((len(self.robot.carriers), 3), sign * np.inf) for sign in (-1, 1)]
+        bandwidth = float(np.sqrt(self._settings["kp"][0]))
+        return {
+            "controller": self._settings,
+            "bandwidth": bandwidth,
+            "damping": float(self._settings["kd"][0]) / (2 * bandwidth),
+            "integral": float(self._settings["ki"][0]),
+            "length": self.robot.length,
+            "negligible": self._negligible,
+            "carried": CARRIED * self.robot.force_scale,
+            "little": self._little,
+            "box": np.stack(low_high),
+            "platform": self._platform[0],
+        }
+
+
+def data_at(robot: Robot, plant: Plant, reference: Reference) -> dict[str, Any]:
+    """Return the members of `towline_unit` at a reference, on which the robot is, with its tensions."""
+    pulls = np.zeros(robot.m) if reference.tensions is None else np.maximum(reference.tensions, 0.0)
+    motion = (reference.pose, reference.velocity, reference.carrier_pose, reference.carrier_velocity)
+    fixed, fastest = plant.fixed_lengths(pulls), max(fastest_motion(plant))
+    state = plant.start(*motion, tensions=pulls if fixed is None else None, lengths=fixed)
+    motions, lengths = sensed(robot, state)
+    carriers = np.stack(reference[3:6], axis=1)  # (c, 3, 6)
+    given = np.vstack([np.concatenate(motion[:2]), np.concatenate(motion[2:], axis=1)])
+    measured = np.where(np.isnan(motions), given, motions)  # at a pitch of 90 degrees
+    controller = _Exported(robot)
+    command = controller.step(0.0, State(*motion, pulls), reference)
+    controller.reset()
+    return {
+        "robot": plant.record,
+        "plant": plant.settings,
+        "longest_step": ANGLE / fastest if fastest else PERIOD,
+        "winding_time": min(winding_time(plant), LONGEST),
+        "mass": robot.platform.mass,
+        "state": state,
+        "last": np.full(2 * robot.m, np.nan),
+        "known": record_of(robot),
+        "period": PERIOD,
+        **controller.data(),
+        "measured": measured.ravel(),
+        "lengths": lengths.ravel(),
+        "tension": pulls,
+        "mean_tension": pulls,
+        "reference": np.concatenate(reference[:3]),
+        "carriers": carriers.ravel(),
+        "jerks": np.zeros(carriers.size // 3),
+        "t_ref": np.zeros(robot.m) if reference.tensions is None else reference.tensions,
+        "ordered": np.stack(command[1:4], axis=1).ravel(),
+        "ordered_jerks": np.zeros(carriers.size // 3),
+        "tensions": command.tensions,
+        "winches": {"lengths": plant.read(state).lengths if fixed is None else fixed, "rates": np.zeros(robot.m)}.get(
+            plant.drive, command.tensions
+        ),
+        "actuation": np.zeros(0) if command.actuation is None else command.actuation.ravel(),
+        "wind": np.zeros(3),
+        "wrench": np.zeros(6),
+    }

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...figures import plan as plan_figures
-from ...figures.convergence import convergence
 from ...figures.drawing import Drawing
 from ...figures.limits import limits
-from ...figures.phase_plane import phase_plane
+from ...figures.plan import convergence, phase_plane
 from ...figures.views import views
 from ...statics.scene import scene
 from ..result import PlanData

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from ...base.netcdf import Contents, Variable
-from ...figures.outlines import outline_variables
 from ...figures.robot import box_edges
+from ...figures.scene import outline_variables
 from ...models.motion_file import dimensions, motion_variables, over
 from ...models.parsing import to_yaml
 from ..result import PlanData

@@ -15,7 +15,7 @@ from ...models.part import Part
 from ...models.robot import Robot
 from ...models.trajectory import Trajectory
 from ...plant import Plant
-from ...plant.periods import Periods
+from ...plant.steps import Periods
 
 
 def number_in(text: Any) -> Any:

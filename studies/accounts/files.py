@@ -8,8 +8,7 @@ from pathlib import Path
 from ...base.writing import whole_file
 from ...figures import page as html
 from ...figures import style
-from .account import Account, Chapter
-from .claim import Claim, Verdict, value_text
+from .claim import Account, Chapter, Claim, Verdict, value_text
 
 NOT_REPRODUCED = "What was not reproduced"
 BY_THE_PAPER = "By the paper"  # head of what it prints, or of what follows from that

@@ -5,9 +5,8 @@ import numpy as np
 from ...models import Dynamics, load
 from ..accounts.claim import Chapter, Claim
 from .claims import claim
-from .instants import Instants, instants, relative_error, turn, turn_back
-from .motion import solved, steady_tensions
-from .rotations import body_rates, printed_acceleration
+from .plans import solved, steady_tensions
+from .rotations import Instants, body_rates, instants, printed_acceleration, relative_error, turn, turn_back
 
 WIND = np.array([5.0, 6.0, 2.0])  # the paper's strongest [m/s]
 INCREMENTS = np.array([0.3, -0.2, 0.1, 0.4, -0.1, 0.2])  # dT of the six cables, any [N]

@@ -6,7 +6,7 @@ from ...models import Dynamics, Robot, load
 from ...models.cables import ElementChain
 from ..accounts.claim import Chapter, Claim
 from .claims import claim
-from .motion import RADIUS, circle, steady_tensions
+from .plans import RADIUS, circle, steady_tensions
 
 ELEMENTS = (1, 2, 5, 16, 64)
 STRETCH = 1e-5  # of the attachment, away from the anchor [m]

@@ -15,8 +15,7 @@ from ...ocp.tasks.paths import Motion
 from ..accounts.claim import Chapter
 from .claims import claim
 from .helix import flight
-from .motion import FEASIBLE, TIMES, circle, steady_tensions
-from .plans import NOT_READ, PITCH, SECONDS, pitching_flight
+from .plans import FEASIBLE, NOT_READ, PITCH, SECONDS, TIMES, circle, pitching_flight, steady_tensions
 
 CAPTIONS = {
     "disturbance-flight": "Figure 12: the quadrotor's flight in {G}, assumed",

@@ -16,8 +16,7 @@ from scipy.optimize import nnls
 from ...models import load
 from ...models.diagnosis import RANK_TOLERANCE
 from ...ocp.tasks.paths import Motion
-from .motion import circle, solved
-from .plans import BELOW, SECONDS
+from .plans import BELOW, SECONDS, circle, solved
 
 PRINTED = "wang-flying-printed"  # the robot as printed
 PAIRINGS = np.array(list(permutations(range(6))))

@@ -23,8 +23,7 @@ from ...ocp.tasks.paths import CirclePath, Motion
 from ...simulation import Simulation, simulate
 from ..accounts.claim import Chapter, Claim
 from .claims import claim
-from .motion import FEASIBLE, TIMES, solved
-from .plans import BELOW, NOT_READ, RATE, SECONDS, Name, planned
+from .plans import BELOW, FEASIBLE, NOT_READ, RATE, SECONDS, TIMES, Name, planned, solved
 from .repair import ON_CIRCLE
 from .wind import NOISE, PEAK
 from .wound import FLIGHT, Wound, wind_up

@@ -11,9 +11,8 @@ from ..accounts.claim import Chapter, Claim, Verdict
 from .claims import claim
 from .every_pairing import PAIRINGS, TURN, at_centre, pull_inward
 from .every_pairing import tensions as tensions_of
-from .instants import instants
-from .motion import RADIUS, TIMES, circle, steady_tensions
-from .plans import LINE, RATE, SECONDS
+from .plans import LINE, RADIUS, RATE, SECONDS, TIMES, circle, steady_tensions
+from .rotations import instants
 
 LIKE_A_SINE = 0.05  # of the amplitude, assumed: a smaller deviation is not visible in figure 7
 

@@ -21,8 +21,8 @@ from ...ocp.tasks.paths import Motion
 from ..accounts.claim import Chapter, Claim, Verdict
 from .cable import constants
 from .claims import claim
-from .instants import turn
-from .motion import FEASIBLE, TIMES, circle, solved
+from .plans import FEASIBLE, TIMES, circle, solved
+from .rotations import turn
 from .vibration import ELEMENTS, STEP, vibration
 
 AMPLITUDE = 1e-6  # of the vibration [m], assumed

@@ -16,8 +16,7 @@ from ...solvers import solve_batch
 from ..accounts.claim import Chapter, Claim, Verdict
 from .claims import claim
 from .every_pairing import PAIRINGS, at_centre, hold, pull_inward
-from .motion import RADIUS, TIMES, circle, steady_tensions
-from .plans import BELOW
+from .plans import BELOW, RADIUS, TIMES, circle, steady_tensions
 
 PRECISION = 1e-4  # [m]
 TURN = TIMES[:-1:5]  # 200 instants of one turn

@@ -10,7 +10,7 @@ from ...models import load
 from ..accounts.claim import Chapter
 from .claims import claim
 from .element import ELEMENTS
-from .motion import RADIUS, circle
+from .plans import RADIUS, circle
 
 TAGS = (1, 2, 2, *range(3, 39))  # numbers of the displayed equations, in order: 2 is printed twice
 IN_STEPS = (6, 11, 12, 23, 24, 39)  # equations by which steps 2 to 7 of section V compute

@@ -14,7 +14,7 @@ from . import plans
 from .circle import tasks
 from .claims import claim
 from .every_pairing import pull_inward
-from .motion import RADIUS
+from .plans import RADIUS
 
 ON_CIRCLE = 0.01  # [m], allowed distance of the platform from its circle
 

@@ -23,7 +23,7 @@ from ...plant import Plant
 from ..accounts.claim import Chapter, Claim
 from .cable import constants
 from .claims import claim
-from .motion import FEASIBLE, circle
+from .plans import FEASIBLE, circle
 from .vibration import ELEMENTS, HERTZ, PHASES, RATIO
 from .wind import NOISE, PEAK
 from .wound import FLIGHT, PERIOD, unstrained, wind_up

@@ -11,7 +11,7 @@ from ...models.points import rotations
 from ...statics.scene import scene_at
 from ..accounts.claim import Chapter, Claim
 from .claims import claim
-from .instants import Instants, instants, relative_error
+from .rotations import Instants, instants, relative_error
 
 ROUNDING = 1e-12  # [m]
 RANK = 1e-9  # of the largest singular value: those below are rounding errors, the printed pairing has rank 3

@@ -23,7 +23,7 @@ from .cable import constants
 from .claims import claim
 from .every_pairing import PAIRINGS, PRINTED, at_centre, hold
 from .every_pairing import tensions as tensions_of
-from .motion import FEASIBLE, RADIUS, TIMES, circle, steady_tensions
+from .plans import FEASIBLE, RADIUS, TIMES, circle, steady_tensions
 
 RATIO = 0.1247  # printed: the largest dT / T of cable 1
 STEP, STEPS = 0.01, (0.001, 0.01, 0.1)  # [s]

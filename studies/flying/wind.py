@@ -10,7 +10,7 @@ from ...models import Dynamics, load
 from ...models.air import trapezoid
 from ..accounts.claim import Chapter, Claim
 from .claims import claim
-from .motion import TIMES
+from .plans import TIMES
 
 PEAK = (5.0, 6.0, 2.0)  # printed in section VI [m/s]
 NOISE = 0.5  # printed, of either sign [m/s]

@@ -9,7 +9,7 @@ from ...ocp.tasks.paths import Motion
 from ...plant import Plant
 from ...plant.reading import Reading
 from .cable import constants
-from .motion import solved
+from .plans import solved
 
 PERIOD = 1e-3  # of the commanded lengths [s]
 FLIGHT = PERIOD * np.arange(10_001)  # [s]

@@ -21,7 +21,7 @@ from towline.benchmarks import harness
 from towline.control import ANSWERS, Command, ComputedTorque, Predictive, Reference, State
 from towline.models import Robot, load
 from towline.plant import Plant
-from towline.plant.periods import Periods
+from towline.plant.steps import Periods
 
 __all__ = ["KINDS", "Steps", "kept", "random_steps", "soak"]
 
