@@ -5,17 +5,14 @@ for winches that take lengths, `Filtered` estimates velocities from poses, and `
 sensors.
 """
 
-from .command import ANSWERS, Command
 from .computed_torque import ComputedTorque
-from .controller import Controller
+from .controller import ANSWERS, Command, Controller, Reference, State
 from .fault_tolerant import FaultTolerant
 from .filtered import Filtered
 from .length_control import LengthControl
 from .open_loop import OpenLoop
-from .planned_references import references
+from .planned_references import Stop, longest_stop, references, stop
 from .predictive import Predictive
-from .state import Reference, State
-from .stops import Stop, longest_stop, stop
 
 __all__ = [
     "ANSWERS",

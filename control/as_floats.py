@@ -9,7 +9,7 @@ from ..base.errors import InputError
 from ..base.inputs import FLOAT, float64, required, shown
 from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
-from .state import Reference, State
+from .controller import Reference, State
 
 Given = TypeVar("Given", State, Reference)
 

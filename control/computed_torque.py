@@ -17,20 +17,16 @@ from ..solvers.in_place import InPlace
 from .as_floats import ROUNDING, as_floats, is_time, measured_at, rows_of
 from .bandwidths import CASCADE, DELAY, HELD, LAG, PERIOD, SWINGING, age_of, bandwidths_for, noise_of, place_for
 from .carried_load import CarriedLoad
-from .command import NOTHING, NOWHERE, PLANNED, SHIFTED, SOFT, Command
 from .controllability import uncontrolled
-from .controller import Controller
+from .controller import NOTHING, NOWHERE, PLANNED, SHIFTED, SOFT, Command, Controller, OneAtATime, Reference, State
 from .deviation import Deviation
 from .fallback import NEGLIGIBLE, answer_others
-from .lag import ROTORS_KEEP, WINCHES_KEEP, RotorLead, tension_lead
+from .lag import ROTORS_KEEP, WINCHES_KEEP, RotorLead, TensionLoop, tension_lead
 from .late_states import OLDEST, LateStates
 from .noise import Noise
-from .one_at_a_time import OneAtATime
 from .records import CABLE, CARRIER, PLATFORM, TURNING
 from .settings import boxes, limits_of, reach_of, set_reach, settings_of, stay_inside
 from .slow_loops import SlowLoops
-from .state import Reference, State
-from .tension_loop import TensionLoop
 
 TAKE_ALONE = -1  # in place of how tensions are solved: `control_step` then only takes state and reference
 SOMETHING = 1e-3  # of its upper limit: what a cable is commanded at least for its reports to mean something

@@ -8,7 +8,7 @@ import numpy as np
 from ..base.inputs import number
 from ..models.points import rotations
 from ..models.robot import Robot
-from .command import OFF, PLANNED, SHIFTED
+from .controller import OFF, PLANNED, SHIFTED
 
 FAR, MOST = 0.05, 0.05  # position: share of the mean length of the cables at home, and at most [m]
 TURNED = 0.5  # [rad], of the rotation between the two

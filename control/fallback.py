@@ -5,7 +5,7 @@ import numpy as np
 from ..models.robot import Robot
 from ..solvers.in_place import InPlace
 from ..solvers.status import OPTIMAL
-from .command import HOLD, PLANNED, SOFT
+from .controller import HOLD, PLANNED, SOFT
 
 NEGLIGIBLE = 1e-3  # of the robot's scale of forces: a wrench that is missed by less is given as planned
 CARRIED = 0.1  # the same of what fewer cables than degrees of freedom cannot give, and leave to their carriers

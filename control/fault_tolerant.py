@@ -15,10 +15,8 @@ from ..models.files import AnyRobot, as_robot
 from ..models.robot import Robot
 from ..statics.formation import formation
 from .as_floats import as_floats
-from .command import Command
-from .controller import Controller
+from .controller import Command, Controller, Reference, State
 from .predictive import Predictive
-from .state import Reference, State
 from .watch import HandOver, lost_carrier
 
 BLENDED = 1.0  # [s], in which the others go to their new formation

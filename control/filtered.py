@@ -13,9 +13,7 @@ from ..base.inputs import required, shown
 from ..core import control_move_on
 from .as_floats import as_floats, measured_at
 from .carried_load import CarriedLoad
-from .command import Command
-from .controller import Controller
-from .state import Reference, State
+from .controller import Command, Controller, Reference, State
 
 SHORT = 1e-5  # [s], in which velocities change by an acceleration
 

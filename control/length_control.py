@@ -16,14 +16,12 @@ from ..models.points import axial, rotations
 from ..models.trajectory import Motion, moved_on
 from .as_floats import as_floats, is_time, measured_at, rows_of
 from .bandwidths import age_of, noise_of
-from .command import HOLD, OFF, PLANNED, Command
-from .controller import Controller
+from .controller import HOLD, OFF, PLANNED, Command, Controller, Reference, State
 from .deviation import Deviation
 from .lag import SHORTEST, Lag
 from .length_gains import LengthGains
 from .noise import Noise
 from .open_loop import planned_command
-from .state import Reference, State
 
 SHARE, STRAIN = 0.05, 0.005  # of the robot's length, and of the longest cable: the default of `most`
 DAMPED = 0.002  # [s/m]: damping of unknown cables, in terms of their stiffness

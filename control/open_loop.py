@@ -8,9 +8,7 @@ from ..base.inputs import required
 from ..models.files import AnyRobot, as_robot
 from ..models.robot import Robot
 from .as_floats import as_floats, rows_of
-from .command import HOLD, PLANNED, Command
-from .controller import Controller
-from .state import Reference, State
+from .controller import HOLD, PLANNED, Command, Controller, Reference, State
 
 
 class OpenLoop(Controller):

@@ -19,14 +19,13 @@ from ..statics.distribution import tensions as tensions_at
 from .as_floats import ROUNDING, as_floats
 from .bandwidths import CASCADE, PATIENT, STILL, TEAM, TOWING, bandwidths_for, noise_of_change
 from .carrier_references import moved_coordinates
-from .command import HOLD, OTHERWISE, SHIFTED, SOFT, Command
 from .computed_torque import ComputedTorque
+from .controller import HOLD, OTHERWISE, SHIFTED, SOFT, Command, Reference, State
 from .keep_out import Surroundings
 from .noise import Noise
 from .preview import STEEPEST, Preview, later, turns
 from .settings import reach_of, set_reach
 from .stability import grows
-from .state import Reference, State
 from .watch import BLIND, KNOWN, PAUSE, QUICK, STEEP, UNSTABLE, HandOver, Watch, flaw_of_carriers
 from .weights import ripple, stage_at_home, terminal, weights
 

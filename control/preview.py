@@ -12,7 +12,7 @@ from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
 from .as_floats import as_floats
 from .carrier_references import Moved
-from .state import Reference
+from .controller import Reference
 
 ROUNDING = 1e-9  # of a period
 STEEPEST = 1.5  # [rad]: near a pitch of 90 degrees roll and yaw change so fast that no linear model is right

@@ -8,9 +8,8 @@ import numpy as np
 from ..models.robot import Robot
 from ..plant import Plant
 from ..solvers import TensionSolution
-from .command import OTHERWISE
 from .computed_torque import ComputedTorque
-from .state import Reference, State
+from .controller import OTHERWISE, Reference, State
 
 PERIOD = 2e-3  # [s] between steps
 SLOWEST = 1e-3  # [rad/s]

@@ -9,9 +9,8 @@ from .events.loads import Carry, Push, Wall
 from .events.references import Follow, StopReference
 from .log_replay import Replay, replay
 from .mismatch import Mismatch
-from .own_run import simulation_of
 from .simulate import simulate
-from .simulation import Simulation
+from .simulation import Simulation, simulation_of
 
 __all__ = [
     "Carry",

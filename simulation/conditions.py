@@ -1,17 +1,26 @@
-"""`Conditions`: wind, sensors and events of a simulation, its time and its steps."""
+"""`Conditions` of a simulation, its winds, and the `Experiment` of all runs of one robot and one reference."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from typing_extensions import override
 
-from ..base.display import Displayed
-from ..base.inputs import finite_array, number, one_of, whole_number
+from ..base.display import Displayed, record
+from ..base.errors import InputError
+from ..base.inputs import finite_array, number, one_of, shown, whole_number
+from ..control import Reference
 from ..control.noise import Noise
+from ..models import air
 from ..models.parsing import validate
+from ..models.robot import Robot
 from ..plant.plant import DRIVES
+from .events.event import Event
+from .events.faults import Cut
 from .mismatch import Mismatch
+
+Wind = Callable[[np.ndarray, int], np.ndarray]  # the wind at times (K,) [s] for a seed, (K, 3) [m/s]
 
 
 @dataclass(frozen=True)
@@ -75,3 +84,85 @@ class Conditions(Displayed):
                 object.__setattr__(self, name, validate({} if given is None else given, kind, name))
         push = finite_array("disturbance", np.zeros(6) if self.disturbance is None else self.disturbance, (6,))
         object.__setattr__(self, "disturbance", push)
+
+
+class Experiment(NamedTuple):
+    """Settings shared by all runs: controller period, references, wind, noise and events, see `Conditions`."""
+
+    period: float  # as in `Conditions`
+    substeps: int  # as in `Conditions`
+    references: Sequence[Reference]  # reference of each period
+    wind: Wind | None  # velocity of the air in {G}; None without air
+    disturbance: np.ndarray  # as in `Conditions`
+    noise: Noise  # as in `Conditions`
+    events: tuple[Event, ...]  # events in order of time
+    keep_out: Sequence[Sequence[np.ndarray]]  # outlines of the keep-out regions of the reference, see `Trajectory`
+    doubt: str = ""  # row of the report that says that the reference is a plan with a broken limit, see `Trajectory`
+    mismatch: Mismatch = Mismatch()  # as in `Conditions`
+    windings: int = 1  # parts of a period, see `plant.steps.windings_in`
+
+    __repr__ = record
+
+    def cut(self, cables: int, periods: np.ndarray) -> np.ndarray:
+        """Return which cables are cut when periods begin, (n, cables); `periods`, (n,), are their numbers."""
+        result = np.zeros((len(periods), cables), dtype=bool)
+        for event in self.events:
+            if isinstance(event, Cut):
+                result[periods * self.period >= event.at - 1e-9 * self.period, event.cable - 1] = True
+        return result
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all settings except the references, ready for JSON."""
+        return {
+            "period": self.period,
+            "substeps": self.substeps,
+            "disturbance": self.disturbance.tolist(),
+            "noise": self.noise.model_dump(exclude_defaults=True),
+            "mismatch": self.mismatch.model_dump(exclude_defaults=True),
+            "events": [event.model_dump(mode="json") for event in self.events],
+        }
+
+
+class MeanWind:
+    """A mean wind [m/s] with Dryden turbulence about it, half as intense vertically; an intensity of 0: none."""
+
+    def __init__(self, velocity: np.ndarray, intensity: float):
+        self._velocity, self._intensity = velocity.tolist(), intensity
+
+    @override
+    def __str__(self) -> str:
+        gusts = f" with gusts of {self._intensity:g} m/s" if self._intensity else ""
+        return f"{' '.join(f'{part:g}' for part in self._velocity)} m/s{gusts}"
+
+    def __call__(self, times: np.ndarray, seed: int) -> np.ndarray:
+        """Return the wind of a seed, (K, 3) [m/s]."""
+        if not self._intensity:
+            return air.constant(times, self._velocity)
+        intensity = (self._intensity, self._intensity, self._intensity / 2)
+        return air.dryden(times, self._velocity, intensity, seed=seed)
+
+
+def read_wind(robot: Robot, wind: Any, gusts: float) -> Wind | None:
+    """Return the wind from the arguments of `simulate`, see there.
+
+    Raises `InputError` if the robot has no `platform.aero`, or an argument has a wrong value.
+    """
+    if wind is None:
+        if gusts:
+            raise InputError(f"gusts must be 0 without a wind, got {gusts:g} m/s")
+        return None
+    if robot.platform.aero is None:
+        raise InputError(f"wind must be left out for robot {robot.name!r}, which has no platform.aero")
+    if callable(wind):
+        function: Any = wind
+        if gusts:
+            raise InputError(f"gusts must be 0 with a wind that is a function, got {gusts:g} m/s")
+        return function
+    try:
+        velocity = np.asarray(wind, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        velocity = np.empty(0)
+    if velocity.shape != (3,) or not (np.abs(velocity) <= 1e3).all():
+        accepted = "three numbers from -1000 to 1000 m/s or a function of times and a seed"
+        raise InputError(f"wind must be {accepted}, got {shown(wind)}")
+    return MeanWind(velocity, gusts)

@@ -1,21 +1,108 @@
-"""`SimulationData`: the numbers of a simulation, which events, figures and reports use."""
+"""`SimulationData`: the numbers of a simulation, its `Record`, and the `Room` of floor and walls that a robot has."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from ..base.display import Displayed
 from ..base.text import quantity
-from ..control import ANSWERS, Reference
-from ..control.command import OTHERWISE
+from ..control import ANSWERS, Command, Reference
+from ..control.controller import NOTHING, OTHERWISE
+from ..models.body import skeleton
+from ..models.points import placed
 from ..models.robot import Robot
-from .experiment import Experiment
-from .record import Record
-from .room import LEAST, room_of
+from .conditions import Experiment
 
 TENSION_TOLERANCE = 1e-3  # of a cable's range: what its tension may be above t_max
+LEAST = 1e-3  # [m]: nearer than this a platform is inside
+UPRIGHT = 1e-6  # of gravity, across z
+
+
+class Period(NamedTuple):
+    """A period of parallel runs, from its beginning on. The next one overwrites its arrays."""
+
+    number: int  # number of the period, from 0
+    alive: np.ndarray  # runs that have not diverged at its end, (N,)
+    motions: np.ndarray  # as `core.sense` writes them
+    lengths: np.ndarray  # likewise
+    tensions: np.ndarray  # mean tensions over the period, (N, m) [N]
+    command: Command  # command of all runs; for a single run its arrays have no leading dimension
+
+
+class Record(Displayed):
+    """Record motions, lengths, tensions and commands of one run, a row for each period."""
+
+    def __init__(self, robot: Robot, periods: int):
+        carriers, m = len(robot.carriers), robot.m
+        self.actuation = np.full((periods, carriers, max(len(carrier.actuators) for carrier in robot.carriers)), np.nan)
+        self.motions = np.full((periods, 1 + carriers, 12), np.nan)
+        self.lengths, self.tensions = (np.full((periods, m), np.nan) for _ in range(2))
+        self.commanded, self.commanded_lengths = (np.full((periods, m), np.nan) for _ in range(2))
+        self.answered = np.zeros(periods, dtype=np.int8)
+        self.direction, self.shortfall = np.full((periods, 6), np.nan), np.full(periods, np.nan)
+        self.unexplained = np.full(periods, np.nan)
+        self.released = np.zeros((periods, m), dtype=bool)
+        self.orders = np.full((periods, carriers, 6), np.nan)
+
+    def take(self, period: Period) -> None:
+        """Keep a period."""
+        k, command = period.number, period.command
+        self.motions[k], self.lengths[k], self.tensions[k] = period.motions[0], period.lengths[0, 0], period.tensions[0]
+        self.commanded[k], self.answered[k], self.orders[k] = command.tensions, command.answered, command.carrier_pose
+        if command.answered:
+            if not 0 < command.answered < len(ANSWERS) or command.answered != int(command.answered):
+                raise IndexError(command.answered)
+            self.direction[k], self.shortfall[k] = command.direction, command.shortfall
+        if command.lengths is not None:
+            self.commanded_lengths[k] = command.lengths
+        if command.released is not None:
+            self.released[k] = command.released
+        if command.unexplained is not NOTHING:
+            self.unexplained[k] = command.unexplained
+        if command.actuation is not None:
+            self.actuation[k] = command.actuation
+
+
+class Room(NamedTuple):
+    """Bounds in {G} of points of the platform's frame."""
+
+    points: np.ndarray  # (k, 3) [m]
+    bounds: np.ndarray  # least and largest coordinates, of points that have their radius as distance, (2, 3) [m]
+    names: tuple[str, ...]  # of the sides in the order of bounds, (6,)
+    is_known: bool  # whether the robot's file has them; otherwise the floor is where it usually is
+
+    def beyond(self, poses: np.ndarray) -> np.ndarray:
+        """Return how far the platform is beyond each side at poses (n, 6), (n, 6) [m]; negative inside."""
+        least, most = (reduce(placed(poses, self.points), axis=1) for reduce in (np.min, np.max))
+        return np.concatenate([self.bounds[0] - least, most - self.bounds[1]], axis=1)
+
+
+@lru_cache(maxsize=16)
+def room_of(robot: Robot) -> Room | None:
+    """Return floor and walls of a robot; None if it has none, nor a usual floor.
+
+    The usual floor is the plane z = 0 of {G}, if gravity points down and neither an anchor nor the platform at home is
+    lower.
+    """
+    body, box = robot.platform.body, robot.workspace_box
+    points, radius = np.vstack([robot.platform.com, robot.attachments]), 0.0
+    if body is not None:
+        points, radius = skeleton(body).corners, body.rounding
+    bounds = np.array([[-np.inf] * 3, [np.inf] * 3] if box is None else [box.min, box.max])
+    names = [f"beyond the {side} {axis} of the room" for side in ("smallest", "largest") for axis in "xyz"]
+    is_known = box is not None or robot.floor is not None
+    if not is_known:
+        x, y, z = robot.gravity
+        lowest = min(robot.home_anchors[:, 2].min(), placed(robot.home, points)[:, 2].min() - radius)
+        if z >= 0 or np.hypot(x, y) > -UPRIGHT * z or lowest < 0:
+            return None
+        bounds[0, 2], names[2] = 0.0, "below z = 0 of {G}, where the floor usually is"
+    elif robot.floor is not None and robot.floor >= bounds[0, 2]:
+        bounds[0, 2], names[2] = robot.floor, "below the floor"
+    return Room(points, bounds + np.array([[radius], [-radius]]), tuple(names), is_known)
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,10 +19,8 @@ from ..base.execution import Execution, started
 from ..base.version import __version__
 from ..control import Controller
 from ..plant import Plant
-from .experiment import Experiment
-from .flights import copies, fly_block, passed
-from .run_statistics import FIGURES
-from .winds import MeanWind
+from .conditions import Experiment, MeanWind
+from .flights import FIGURES, copies, fly_block, passed
 
 SIDE_BY_SIDE = 250  # flights in one block, at most
 BLOCK_TIME = 3.0  # [s] that a block should take: what is computed is stored so often, and lost if the process ends

@@ -30,20 +30,17 @@ from ..models.trajectory import ROUNDING, Trajectory
 from ..plant import Plant
 from ..plant.steps import default_drive, steps_in, windings_in
 from .command_conversion import Orders
-from .conditions import Conditions
-from .events.event import Event
+from .conditions import Conditions, Experiment, read_wind
+from .data import Record
+from .events.event import Event, read_events
 from .events.faults import Stick
 from .events.loads import Carry
-from .events.read import read_events
-from .experiment import Experiment
 from .flights import copies, flights, plant_of, summary
 from .flying import fly
 from .log_replay import replay
 from .mismatch import Mismatch
-from .record import Record
 from .runs import fly_many
 from .simulation import Simulation
-from .winds import read_wind
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,9 +12,8 @@ from scipy.spatial.transform import Rotation
 from ..base.errors import InputError
 from ..estimation.logs.encoders import stretched
 from ..estimation.logs.pose_track import PoseTrack, track_of
-from ..estimation.logs.recorded import Recorded
+from ..estimation.logs.recorded import TO_COMPARE, Recorded
 from ..estimation.logs.recording import GAP
-from ..estimation.logs.replay_needs import TO_COMPARE
 from ..estimation.logs.smoothing import noise_of, smooth, widest_parabola
 from ..models import points
 from ..models.dynamics import dynamics_of

@@ -11,7 +11,7 @@ from towline import load
 from towline.base.errors import InputError
 from towline.cli.calibrate import by_name
 from towline.estimation.calibration import Measurements, read_measurements
-from towline.estimation.logs import Sigma, opening, tables
+from towline.estimation.logs import Sigma, opening
 from towline.models import points
 from towline.ocp.tasks.paths.point_file import read_points
 
@@ -296,7 +296,7 @@ LARGE = {
 @pytest.mark.parametrize("case", LARGE)
 def test_csv_that_is_too_large_is_refused_before_its_fields_are_read(case, tmp_path, monkeypatch):
     """The limits are lowered here, to spare the test large files."""
-    monkeypatch.setattr(tables, "MOST_FIELDS", 2_000_000)
+    monkeypatch.setattr(opening, "MOST_FIELDS", 2_000_000)
     monkeypatch.setattr(opening, "LARGEST_CSV", 50_000_000)
     text, message = LARGE[case]
     (tmp_path / "log.csv").write_text(text, encoding="utf-8")

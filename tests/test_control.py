@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from towline.base.errors import InputError
 from towline.control import ANSWERS, ComputedTorque, OpenLoop, Predictive, Reference, State
+from towline.control.lag import TensionLoop
 from towline.control.settings import reach_of
-from towline.control.tension_loop import TensionLoop
 from towline.core import control_move_on
 from towline.models import Dynamics, Robot, load
 from towline.models.record import record_of

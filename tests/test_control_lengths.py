@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from towline import InputError, load, plan, simulate
 from towline.control import ANSWERS, ComputedTorque, LengthControl, Reference, State, references
-from towline.control.command import HOLD, PLANNED
+from towline.control.controller import HOLD, PLANNED
 from towline.control.length_gains import LengthGains
 from towline.models import Dynamics, Robot
 from towline.models.points import angles

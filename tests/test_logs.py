@@ -15,8 +15,8 @@ from towline.base.errors import InputError
 from towline.estimation.logs import read_log, read_measurements, recordings
 from towline.estimation.logs.mapping import fields_of
 from towline.estimation.logs.names import role
-from towline.estimation.logs.replay_needs import TO_COMPARE
-from towline.estimation.logs.tables import from_csv
+from towline.estimation.logs.opening import from_csv
+from towline.estimation.logs.recorded import TO_COMPARE
 from towline.models import Dynamics, points
 
 from .recorded import motion, quaternions, recorded, write_json_mcap, write_ros1_bag, write_ros2_bag, write_ros2_mcap

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline, make_smoothing_spline
 from scipy.spatial.transform import Rotation
 
 from towline import Dynamics, Robot, load, simulate
-from towline.control.command import HOLD
+from towline.control.controller import HOLD
 from towline.plant import Plant
 
 G, AWAY = 9.81, np.array([1.0, 0.4, 0.3]) / np.sqrt(1.25)

@@ -10,8 +10,7 @@ from towline.estimation import pose_from_lengths
 from towline.estimation.calibration import Measurements, calibrate
 from towline.estimation.logs.encoders import lengths_of, readings_of
 from towline.estimation.pose.from_log import poses_from_log
-from towline.estimation.pose.parameter_errors import length_errors
-from towline.estimation.pose.residual_tests import squares_of
+from towline.estimation.pose.residual_tests import length_errors, squares_of
 from towline.models import Dynamics, Uncertainty, points
 from towline.statics.robust import uncertainty_of
 

@@ -15,7 +15,7 @@ from towline.estimation.logs import read_log, recordings
 from towline.estimation.logs.listing import listing
 from towline.estimation.logs.measurements import measured_poses
 from towline.estimation.logs.names import role, time_unit
-from towline.estimation.logs.tables import from_csv
+from towline.estimation.logs.opening import from_csv
 
 from . import user_recordings as user
 from .warm import towline

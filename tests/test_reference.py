@@ -12,7 +12,7 @@ from PIL import Image
 
 from towline import Robot, Task, available, design, load, plan
 from towline.cli.main import COMMANDS, app
-from towline.control.command import ANSWERS
+from towline.control.controller import ANSWERS
 from towline.ocp import MotionStatus
 from towline.ocp.sweeps.row import FAILED
 from towline.solvers import Status

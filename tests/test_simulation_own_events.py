@@ -15,7 +15,7 @@ from towline.control.command_delay import Pending
 from towline.control.trajectory import read_trajectory
 from towline.models import Dynamics
 from towline.simulation import Cut, Event, Follow, Push, Wall
-from towline.simulation.events.read import read_events
+from towline.simulation.events.event import read_events
 
 PAGE = (Path(__file__).parent.parent / "docs" / "adding-an-event.md").read_text()
 (CODE,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)

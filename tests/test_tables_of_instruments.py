@@ -5,7 +5,7 @@ import pytest
 
 from towline import InputError
 from towline.estimation.logs.names import role
-from towline.estimation.logs.tables import from_csv
+from towline.estimation.logs.opening import from_csv
 
 LENGTHS = np.array([[2.0, 3.0], [2.1, 3.1], [2.3, 2.9], [2.6, 2.8]])
 PLACES = np.array([[100.0, 20.0, 900.0], [110.0, 25.0, 905.0], [120.0, 30.0, 910.0]])  # [mm]

@@ -14,7 +14,7 @@ from towline.estimation.calibration.enough import usual
 from towline.estimation.calibration.geometry import length_of
 from towline.estimation.calibration.plausibility import mistake
 from towline.estimation.logs import read_log
-from towline.estimation.logs.tables import from_csv
+from towline.estimation.logs.opening import from_csv
 
 from . import user_recordings as user
 from .warm import towline

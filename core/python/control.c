@@ -97,7 +97,7 @@ static int put_reference(PyObject *reference, const towline_robot *robot, Py_ssi
     return tensions == Py_None || put(tensions, rows, (place){t_ref, m, 0, 1, 0, m});
 }
 
-/* Whether state and reference are tuples as of control/state.py. */
+/* Whether state and reference are tuples as of control/controller.py. */
 static int are_given(PyObject *state, PyObject *reference) {
     return PyTuple_Check(state) && PyTuple_Size(state) >= 5 && PyTuple_Check(reference) && PyTuple_Size(reference) >= 7;
 }

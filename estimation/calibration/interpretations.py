@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...models import points
-from ..logs.north_east_down import FROM_FRD, FROM_NED
+from ..logs.carrier_poses import FROM_FRD, FROM_NED
 
 FACTORS = {
     1e-3: "millimetres read as metres",

@@ -17,8 +17,8 @@ from ...models import points
 from ...models.dynamics import Dynamics
 from ...models.robot import Robot
 from .encoders import lengths_of
-from .field import Field
 from .measurements import Measurements, carriers_of, measured_poses
+from .recording import Field
 
 FRAMES = {"world": "in {G}", "carrier": "in the frames of the carriers", "platform": "in the frame of the platform"}
 ENDS = {1.0: "from the anchors to the platform", -1.0: "from the platform to the anchors"}

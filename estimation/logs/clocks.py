@@ -12,14 +12,12 @@ from ...models.dynamics import Dynamics
 from ...models.robot import Robot
 from .alignment import Clock, ClockJumpError, align, check_jumps
 from .cable_directions import vectors
-from .carrier_poses import angles_at, carriers_at
+from .carrier_poses import angles_at, carriers_at, from_ned, ned_frame, platform_from_ned
 from .encoders import locked
-from .field import Field
 from .mapping import LogMap, carrier_fields
 from .measurements import Measurements, measured_poses, tracked
-from .north_east_down import from_ned, ned_frame, platform_from_ned
 from .pose_track import PoseTrack, unit_quaternions
-from .recording import Recording, Samples, check_rising
+from .recording import Field, Recording, Samples, check_rising
 from .streams import Reader, at_times
 
 MOST_ALIGNED = 200_000  # poses

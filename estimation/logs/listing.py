@@ -12,8 +12,8 @@ from ...models.robot import Robot
 from .mapping import Fields, LogMap, carrier_fields, command_fields, fields_of, free_axes
 from .names import UNITS, time_unit
 from .reading import of_two_sensors
+from .recorded import missing_for_replay
 from .recording import GAP, Recording, Topic, plain
-from .replay_needs import missing_for_replay
 from .streams import are_too_partial
 
 MOST_NAMED = 8  # fields of a topic

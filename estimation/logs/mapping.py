@@ -14,9 +14,8 @@ from ...base.inputs import file_path
 from ...models.parsing import read_yaml
 from ...models.part import COORDINATES, Part
 from ...models.robot import Robot
-from .field import AXES, MOST_LISTED, Field, in_units
 from .names import UNITS, role
-from .recording import Recording, Topic, plain
+from .recording import AXES, MOST_LISTED, Field, Recording, Topic, in_units, plain
 from .usual_fields import usual_fields, within
 
 TITLE = re.compile(r"(.+?)(?:\s+\[([^\]]*)\])?")

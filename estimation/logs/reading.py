@@ -14,19 +14,26 @@ from ...models.files import AnyRobot, as_robot
 from ...models.robot import Robot
 from .alignment import Clock
 from .cable_directions import in_world, vectors
-from .carrier_poses import carriers_at, pulls_by_thrust
+from .carrier_poses import (
+    FROM_FRD,
+    FROM_NED,
+    carriers_at,
+    carriers_from_ned,
+    ned_frame,
+    note_of,
+    platform_from_ned,
+    pulls_by_thrust,
+)
 from .clocks import Seen, clock_of_poses, set_clocks_of_carriers
 from .encoders import lengths_of, unrolled
-from .field import Field
 from .frozen import seen
 from .load_cells import notes as unreadable_notes
 from .mapping import Fields, LogMap, carrier_fields, fields_of, free_axes, listed, read_map
 from .measurements import Measurements
 from .names import LETTERED, corner
-from .north_east_down import FROM_FRD, FROM_NED, carriers_from_ned, ned_frame, note_of, platform_from_ned
 from .opening import recordings
 from .pose_track import PoseTrack, unit_quaternions
-from .recording import COUNTED, Recording, Samples
+from .recording import COUNTED, Field, Recording, Samples
 from .streams import Reader, at_times, complete_samples, interpolated, like_time
 from .thrust_gains import notes_of_tilts
 

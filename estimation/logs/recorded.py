@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,17 +15,17 @@ from ...models.robot import Robot
 from ..calibration.correction import corrected_log
 from ..calibration.plausibility import mistake
 from ..pose.from_log import poses_from_log
-from .carrier_poses import carriers_at, filled
+from .carrier_poses import carriers_at, carriers_from_ned, filled, ned_frame, note_of, platform_from_ned
 from .encoders import lengths_of
-from .field import Field
 from .load_cells import unreadable
-from .mapping import carrier_fields, command_fields, read_map
-from .north_east_down import carriers_from_ned, ned_frame, note_of, platform_from_ned
+from .mapping import Fields, carrier_fields, command_fields, read_map
 from .reading import Log, Paths, read_log
-from .replay_needs import missing_for_replay
+from .recording import Field
 from .streams import Reader
 from .thrust_gains import notes as notes_of_gains
 from .thrust_gains import thrust_gains
+
+TO_COMPARE = "poses, or tensions or lengths that do not drive the plant"
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,3 +181,31 @@ def _poses(robot: Robot, read: Log, notes: list[str]) -> tuple[np.ndarray, np.nd
         known |= seen
     poses[:, ~moves] = np.where(np.isfinite(poses[:, moves]).all(axis=1, keepdims=True), robot.home[~moves], np.nan)
     return poses, known & moves, seen
+
+
+def missing_for_replay(
+    found: Fields, commands: Fields, timed: bool, robot: Robot | None = None, placed: Collection[str] = ()
+) -> str | None:
+    """Return what a log lacks for a replay, or None.
+
+    - `found`: fields of the measurements.
+    - `commands`: fields of commands and efforts, as of `command_fields`.
+    - `timed`: True if the measurements have times.
+    - `robot`: the robot, if it is known.
+    - `placed`: names of the carriers whose positions were recorded.
+    """
+    fixed = robot is not None and robot.fixed_lengths is not None
+    moving = [] if robot is None else [one.name for one in robot.carriers if one.free_coordinates(robot.drive)]
+    turns = robot is None or bool(robot.dof_mask[3:].any())
+    if not timed:
+        return "times"
+    if lost := next((name for name in moving if name not in placed), None):
+        return f"poses of carrier {lost} ({lost}_x, ..., {lost}_qw)"
+    whole = bool(found.position) and (bool(found.orientation) or not turns)
+    if not (whole or found.directions) and (moving or not found.lengths):
+        return "poses of the platform, position and orientation,"
+    read = bool(found.lengths) and commands.commands != found.lengths
+    pulled = bool(commands.efforts if not found.tensions else commands.commands != found.tensions)
+    compared = bool(found.position or found.directions) + bool(turns and found.orientation) + read + pulled
+    driving = 0 if fixed or commands.commands else 1  # measured lengths or tensions
+    return None if compared > driving else TO_COMPARE

@@ -7,10 +7,9 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.text import quantity
 from ...models.part import LARGEST
-from .field import Field
 from .mapping import Fields
 from .names import UNITS, dated_unit, time_unit
-from .recording import GAP, Samples, Topic, check_rising, plain
+from .recording import GAP, Field, Samples, Topic, check_rising, plain
 
 MOST_REPEATED = 0.2  # of the samples of a table, that may repeat a time
 FEWEST, STEADY = 20, 5.0  # samples, and how many times the usual step the longest one of a time may be

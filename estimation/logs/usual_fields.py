@@ -6,9 +6,8 @@ from contextlib import suppress
 from typing import TypeAlias
 
 from ...base.errors import InputError
-from .field import AXES, MOST_LISTED, Field, in_units
 from .names import ANGLE_OF, LETTERS, TURNED, Role, corner, measured_name, role
-from .recording import Recording, Topic
+from .recording import AXES, MOST_LISTED, Field, Recording, Topic, in_units
 
 OTHER_AXES = ("012", "123", "ned", "enu")  # of position[0], PlatformPosition_1 and PN, for x, y, z
 OF_DIRECTION = ("x", "y", "z", "swivel", "azimuth", "elevation")

@@ -14,8 +14,7 @@ from ...models import points
 from ...models.dynamics import dynamics_of
 from ...models.record import record_of
 from ...models.robot import Robot
-from .parameter_errors import length_errors
-from .residual_tests import BLOCK, SINGULAR, residual_tests, squares_of
+from .residual_tests import BLOCK, SINGULAR, length_errors, residual_tests, squares_of
 
 FALSE_ALARM = 0.01  # share of sound measurements that count as inconsistent
 FALSE_ALARM_IN_LOG = 1e-4  # probability that any sample of a sound log is called wrong

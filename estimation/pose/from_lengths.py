@@ -18,8 +18,8 @@ from ...models.robot import Robot
 from ...statics.equilibria import Equilibrium, equilibria
 from ...statics.rest_near import rests_near, sensitivity
 from .estimate import PoseEstimate, moved, unbounded
-from .parameter_errors import length_errors
 from .problem import Problem, problem_of
+from .residual_tests import length_errors
 from .search import estimates
 
 SIGMA = 1e-3  # [m], of a measured length: what a winch with an encoder achieves

@@ -22,9 +22,9 @@ from ...base.inputs import check_ending, file_path, one_of, printable
 from ...base.version import __version__
 from ...base.writing import check_writable, whole_file
 from ...control.computed_torque import ComputedTorque
+from ...control.controller import Reference, State
 from ...control.fallback import CARRIED
 from ...control.planned_references import references_at
-from ...control.state import Reference, State
 from ...control.trajectory import read_trajectory
 from ...core import MOST_CABLES
 from ...models.files import AnyRobot, as_robot

@@ -50,7 +50,7 @@ typedef struct {
     towline_turning turning;
     double last_time; /* of its last step [s] */
     int64_t has_begun;
-    double answered; /* 0: as planned, 2: soft wrench, 3: hold, as in control/command.py */
+    double answered; /* 0: as planned, 2: soft wrench, 3: hold, as in control/controller.py */
     /* What both share. */
     double time;
     double measured[UNIT_MOTIONS], lengths[2 * UNIT_CABLES];
