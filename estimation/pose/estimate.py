@@ -39,8 +39,8 @@ class PoseEstimate(Displayed):
             `consistent` at the 0.01 % level, even if the cables cannot hold it with the file's CoM and load. Always
             False with a start.
         by_gravity: True if the lengths alone do not determine the pose, and gravity fixes it, (...).
-        known_covariance: Covariance due to noise, (..., 6, 6), if the search has computed it: for a single pose with a
-            start, and for equilibria; otherwise None.
+        known_covariance: `covariance_of_noise` once it is computed, (..., 6, 6): by the search for a single pose with a
+            start and for equilibria, otherwise when it is first asked for; None before.
         by_parameters: Covariance of equilibria due to the `uncertainty` of the robot file, (..., 6, 6), zero for other
             poses; None without any.
     """
@@ -81,7 +81,7 @@ class PoseEstimate(Displayed):
                 shaped = value[0] if value.ndim > 1 else bool(value[0])
             setattr(self, name, shaped)
         self.carrier_pose = carrier_pose
-        for name in ("covariance", "covariance_of_noise", "conditioned"):  # of the former dimensions
+        for name in ("covariance", "conditioned"):  # of the former dimensions
             self.__dict__.pop(name, None)
 
     @property
@@ -119,8 +119,10 @@ class PoseEstimate(Displayed):
         own = self.covariance_of_noise
         if self.by_parameters is not None:
             own = own + self.by_parameters
+        if self.robot.uncertainty is None:
+            return own
         lengths_alone = ~np.asarray(self.by_gravity, dtype=bool) & np.isfinite(own).all(axis=(-2, -1))
-        if self.robot.uncertainty is None or not lengths_alone.any():
+        if not lengths_alone.any():
             return own
         pose, measured = self.pose.reshape(-1, 6), self._lengths_at(self.pose) - self.residuals
         measured = measured.reshape(-1, self.robot.m)
@@ -134,11 +136,14 @@ class PoseEstimate(Displayed):
             added[rows] = by_file @ self.robot.uncertainty.matrix @ np.swapaxes(by_file, 1, 2)
         return own + added.reshape(own.shape)
 
-    @cached_property
+    @property
     def covariance_of_noise(self) -> np.ndarray:
         """Return the part of the covariance that is due to the noise of the lengths, (..., 6, 6)."""
-        if self.known_covariance is not None:
-            return self.known_covariance
+        if self.known_covariance is None:
+            self.known_covariance = self._covariance_of_noise()
+        return self.known_covariance
+
+    def _covariance_of_noise(self) -> np.ndarray:
         covariances = np.empty((*self.pose.shape[:-1], 6, 6))
         poses = np.ascontiguousarray(self.pose)
         pose_covariance(record_of(self.robot), self._carriers(), 1.0 / self.sigma, poses, covariances)

@@ -55,16 +55,15 @@ def pose_from_lengths(
     """
     robot = as_robot(robot)
     lengths, deviations = checked_lengths(lengths, robot), checked_sigma(sigma, robot.m)
-    shapes = {"lengths": lengths.shape[:-1]}
-    carriers = None
-    if carrier_pose is not None:
-        carriers = _poses("carrier_pose", carrier_pose, (len(robot.carriers), 6))
-        shapes["carrier_pose"] = carriers.shape[:-2]
+    carriers = None if carrier_pose is None else _poses("carrier_pose", carrier_pose, (len(robot.carriers), 6))
     if start is not None:
         start = _poses("start", start, (6,))
-        shapes["start"] = start.shape[:-1]
-    if not any(shapes.values()) and start is not None and not (problem := problem_of(robot, carriers)).open:
-        return _near(problem, lengths, start, carriers, deviations)
+        if lengths.ndim == start.ndim == 1 and (carriers is None or carriers.ndim == 2):
+            problem = problem_of(robot, carriers)
+            if not problem.open:
+                return _near(problem, lengths, start, carriers, deviations)
+    arguments = {"lengths": (lengths, 1), "carrier_pose": (carriers, 2), "start": (start, 1)}
+    shapes = {name: of.shape[: of.ndim - core] for name, (of, core) in arguments.items() if of is not None}
     batch = lengths.shape[:-1] if len(set(shapes.values())) == 1 else leading(shapes)
     rows = _rows(lengths, batch, 1)
     each = carriers if carriers is None or carriers.ndim == 2 else _rows(carriers, batch, 2)
