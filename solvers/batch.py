@@ -1,5 +1,6 @@
 """Many problems in one call: `solve_batch`."""
 
+import math
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -168,15 +169,13 @@ def solve_batch(
     }
     core = {name: {"A": 2, "length": 0}.get(name, 1) for name in given}
     lead = leading({name: value.shape[: value.ndim - core[name]] for name, value in given.items()})
-    problem = {
-        name: np.broadcast_to(value, lead + value.shape[value.ndim - core[name] :]) for name, value in given.items()
-    }
-    count, backend = int(np.prod(lead, dtype=np.int64)), _backend(backend, n, m)
+    problem = {name: _broadcast(value, core[name], lead) for name, value in given.items()}
+    count, backend = math.prod(lead), _backend(backend, n, m)
     unsure = np.full(count, float(UNSURE))
     rows = _Rows(np.empty((count, m)), np.empty((count, n)), np.empty((count, 2)), np.empty(count), unsure)
     if backend != BEYOND_THE_CORE and count:
         columns = [
-            (NONE, 0) if name == "weights" and weights is None else _column(value, core[name], count, lead)
+            (NONE, 0) if name == "weights" and weights is None else _column(value, problem[name], core[name], count)
             for name, value in given.items()
         ]
         _solve_by_core(rows, columns, backend == LANES, rho or 0.0, threads)
@@ -206,13 +205,18 @@ class _Rows(NamedTuple):
     status: Array  # (rows,)
 
 
-def _column(value: Array, core: int, rows: int, lead: tuple[int, ...]) -> tuple[Array, int]:
+def _broadcast(value: Array, core: int, lead: tuple[int, ...]) -> Array:
+    """Return an array whose last `core` dimensions are its own as (*lead, ...)."""
+    shape = lead + value.shape[value.ndim - core :]
+    return value if value.shape == shape else np.broadcast_to(value, shape)
+
+
+def _column(value: Array, of_all: Array, core: int, rows: int) -> tuple[Array, int]:
     """Return the numbers of all rows as (rows, ...), or those that serve all as (1, ...), and how many a row has."""
-    tail = value.shape[value.ndim - core :]
-    size = int(np.prod(tail, dtype=np.int64))
+    size = math.prod(value.shape[value.ndim - core :])
     if value.size == size:
         return np.ascontiguousarray(value).reshape(1, size), 0
-    return np.ascontiguousarray(np.broadcast_to(value, lead + tail)).reshape(rows, size), size
+    return np.ascontiguousarray(of_all).reshape(rows, size), size
 
 
 def _solve_by_core(
