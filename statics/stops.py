@@ -165,8 +165,10 @@ def _audited(robot: Robot, trajectory: Trajectory, laws: list[_Law]) -> Iterator
     w = dynamics.required_wrench(*slowed, wind=trajectory.wind) * robot.dof_mask
     near = np.zeros(robot.m) if trajectory.tensions is None else np.nan_to_num(trajectory.tensions(law.tau))
     near, rows = np.broadcast_to(near, (len(w), robot.m)), np.flatnonzero(robot.dof_mask)
-    exact = solve_batch(A[:, rows], w[:, rows], robot.t_min, robot.t_max, t_ref=near, length=robot.length)
-    tensions, rest = exact.tensions, ~exact.feasible
+    few = robot.m < len(rows)  # cables, which miss nearly every wrench by a little, as in plans
+    given = A[:, rows], w[:, rows], robot.t_min, robot.t_max
+    exact = solve_batch(*given, t_ref=near, length=robot.length, rho=RHO if few else None)
+    tensions, rest = exact.tensions, ~(exact.feasible | few)
     if rest.any():
         nearest = solve_batch(
             A[rest], w[rest], robot.t_min, robot.t_max, t_ref=near[rest], length=robot.length, rho=RHO
@@ -174,7 +176,7 @@ def _audited(robot: Robot, trajectory: Trajectory, laws: list[_Law]) -> Iterator
         tensions[rest] = nearest.tensions
     missing = np.linalg.norm((w - (A @ tensions[:, :, None])[..., 0]) * robot.wrench_scale, axis=1) / robot.force_scale
     lengths, last = dynamics.cable_lengths(platform[0], carriers[0]), 0
-    most = LITTLE if robot.m < len(robot.platform.dof) else MISSING  # few cables: as much as plans may miss
+    most = LITTLE if few else MISSING
     for own in laws:
         some = slice(last, last := last + len(own.times))
         at = some.start + int(np.argmax(missing[some]))

@@ -13,19 +13,22 @@ from ..models.robot import Robot
 from ..models.trajectory import Motion
 from .winch_forces import largest_forces
 
-ACCEPTED = 2e-3  # of a limit's range, up to which differences are inexact
-UNDERSHOOT, ROUNDING = 0.1, 1e-6  # of a smallest tension, and of its range: how far a tension may be below it
+ACCEPTED = 2e-3  # of a limit's range: what differences of a plan's motion may seem to exceed it by
+ROUNDING = 1e-6  # of a limit's range
+# Of second differences: what values reach beyond those at instants, at most. Poses are parabolas between instants;
+# accelerations oscillate where the jerk jumps, since they are differences, and so do forces.
+OF_POSES, OF_FORCES = 1 / 8, 1.0
 LACKING = 0.01  # of the largest tension: a force that no actuator gives
 
 
 class Row(NamedTuple):
-    """A limit: its name, values (d, n) and their range, and the accepted excess as a share of it."""
+    """A limit: its name, values (d, n) and their range, and what these reach between instants."""
 
     name: str
     values: np.ndarray
     low: float
     high: float
-    accepted: float = ACCEPTED
+    between: float = OF_FORCES
 
 
 class Carriers(NamedTuple):
@@ -64,28 +67,44 @@ def pull_of(robot: Robot, forces: np.ndarray) -> np.ndarray:
     return -(carriers_of(robot).holds @ forces)
 
 
-def excess_of(rows: list[Row], begins_inside: bool = True) -> np.ndarray:
-    """Return how far limits are exceeded, (k, d, n), relative to their ranges; accepted excess is none.
+def excess_of(rows: list[Row], begins_inside: bool = True, of_plan: bool = False) -> np.ndarray:
+    """Return how far limits are exceeded, (k, d, n), relative to their ranges.
 
-    Unless a stop should begin inside, so much as it has first is no excess. What is undefined is infinitely much.
+    Unless a stop should begin inside, so much as it has first is no excess. What is undefined is infinitely much. The
+    motion `of_plan` itself has been audited between its instants, and limits stay as they are for several durations.
     """
-    values = np.stack([row.values for row in rows])  # (k, d, n)
-    low, high, accepted = np.array([row[2:] for row in rows]).T[..., None, None]  # (k, 1, 1) each
-    floor = low if begins_inside else np.minimum(low, values[..., :1])
-    ceiling = high if begins_inside else np.maximum(high, values[..., :1])
-    beyond = np.where(np.isnan(values), np.inf, np.maximum(floor - values, values - ceiling) / _range(low, high))
-    return np.where(beyond > accepted, beyond, 0.0)
+    low, high = np.array([row[2:4] for row in rows]).T[..., None, None]  # (k, 1, 1) each
+    least, most = _reached(rows, of_plan)
+    floor = low if begins_inside else np.minimum(low, least[..., :1])
+    ceiling = high if begins_inside else np.maximum(high, most[..., :1])
+    beyond = np.where(np.isnan(most), np.inf, np.maximum(floor - least, most - ceiling) / _range(low, high))
+    return np.where(beyond > (ACCEPTED if of_plan else ROUNDING), beyond, 0.0)
 
 
-def worst_of(rows: list[Row], times: np.ndarray) -> tuple[float, str]:
+def worst_of(rows: list[Row], times: np.ndarray, of_plan: bool = False) -> tuple[float, str]:
     """Return the largest excess of one stop, at times (n,), and the text of that limit; empty if there is none."""
-    excess = excess_of(rows)[:, 0]
+    excess = excess_of(rows, of_plan=of_plan)[:, 0]
     k, at = np.unravel_index(np.argmax(excess), excess.shape)
     if excess[k, at] == 0:
         return 0.0, ""
-    row, value = rows[k], rows[k].values[0, at]
-    bound = row.low if value < row.low else row.high
+    row, (least, most) = rows[k], (part[k, 0, at] for part in _reached(rows, of_plan))
+    value, bound = (least, row.low) if least < row.low else (most, row.high)
     return float(excess[k, at]), f"{row.name}: {quantity(value)} of {bound:g} at {quantity(times[at], 's')}"
+
+
+def _reached(rows: list[Row], of_plan: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return the least and the largest values that are reached near each instant of one stop, (k, 1, n) each.
+
+    Those of several durations, (k, d, n), are the values at the instants, which are too few to know more.
+    """
+    values = np.stack([row.values for row in rows])
+    if of_plan or values.shape[1] > 1:
+        return values, values
+    bends = np.pad(np.abs(np.diff(values, 2)), ((0, 0), (0, 0), (2, 2)), "edge")
+    low, between = np.array([(row.low, row.between) for row in rows]).T[..., None, None]
+    more = between * np.maximum(np.maximum(bends[..., :-2], bends[..., 1:-1]), bends[..., 2:])
+    # Sizes are not below zero.
+    return np.maximum(values - more, np.where(low == 0, np.minimum(values, 0.0), -np.inf)), values + more
 
 
 def _range(low: Any, high: Any) -> Any:
@@ -122,8 +141,7 @@ def limits_of(
     tilts, ranges = np.arccos(np.clip(R[..., 2, 2], -1, 1)), zip(robot.t_min, robot.t_max, strict=True)
     rows = list[Row]()
     for i, (low, high) in enumerate(ranges):
-        accepted = min(ACCEPTED, UNDERSHOOT * low / _range(low, high) + ROUNDING)  # so that no cable pushes
-        rows.append(Row(f"tension {i + 1}", tensions[..., i], low, high, accepted))
+        rows.append(Row(f"tension {i + 1}", tensions[..., i], low, high, 0.0))  # linear between instants
     if windings is not None:
         most = enumerate(largest_forces(robot))
         rows += [
@@ -138,10 +156,10 @@ def limits_of(
             lacking = np.linalg.norm((wrench - given)[..., :3], axis=-1)
             most = max(robot.t_min[its.first[k]], LACKING * robot.t_max[its.first[k]])
             rows.append(Row(f"force perpendicular to the thrust of {name}", lacking, 0.0, most))
-        for what, values, largest in (
-            ("speed", speeds, own.speed),
-            ("acceleration", bends, own.acceleration),
-            ("tilt", tilts, own.tilt),
+        for what, values, largest, between in (
+            ("speed", speeds, own.speed, OF_FORCES),
+            ("acceleration", bends, own.acceleration, OF_FORCES),
+            ("tilt", tilts, own.tilt, OF_POSES),
         ):
-            rows += [] if largest is None else [Row(f"{what} of {name}", values[..., k], 0.0, largest)]
+            rows += [] if largest is None else [Row(f"{what} of {name}", values[..., k], 0.0, largest, between)]
     return rows

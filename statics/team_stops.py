@@ -34,6 +34,7 @@ COARSE, FINE, APART = 24, 150, 0.01  # instants of an attempt, and at most of th
 SMOOTHED = 0.03  # [s], over which tilt is smoothed: a plan's jerk jumps between its nodes
 LONGER, AGAIN = 1.03, 4  # at least, then its third and ninth power, and how often: what broke a limit takes longer
 TINY, RANK = 1e-12, 1e-9  # of a matrix
+ROUNDING = 1e-6  # [s]
 TILTS = 3  # times that positions are computed from tilts, which follow from accelerations
 INSTANT = 1e-4  # [s], for differences of attitudes
 MOST_FADING = 4.0, 20.0  # derivatives of log(tension) at the end of a plan [1/s, 1/s^2]: larger ones are noise
@@ -120,7 +121,8 @@ def _give_every_wrench(robot: Robot) -> bool:
 
 def _remainder(robot: Robot, trajectory: Trajectory, begins: float) -> TeamStop:
     """Return the rest of a plan that ends at rest, with the limit that it breaks most."""
-    left = max((trajectory.duration or 0.0) - begins, SHORTEST)
+    left = (trajectory.duration or 0.0) - begins
+    left = left if left > ROUNDING else APART  # no instant after the end, where accelerations may jump to zero
     times = np.linspace(0.0, left, max(int(left / APART), 10))
     platform, carriers = trajectory.at(begins + times)
     forces, tensions, _ = _forces(robot, trajectory, np.ones(len(times)), platform, platform, carriers, times - left)
@@ -132,7 +134,7 @@ def _remainder(robot: Robot, trajectory: Trajectory, begins: float) -> TeamStop:
     turning = R, (after - before) / (2 * INSTANT), (after - 2 * R + before) / INSTANT**2
     windings = _windings(robot, times[None], platform[0][None], pose, tensions[None])
     rows = limits_of(robot, motion, forces[None], tensions[None], turning, windings)  # type: ignore[arg-type]
-    return TeamStop(times, begins + times, platform, carriers, tensions, *worst_of(rows, times))
+    return TeamStop(times, begins + times, platform, carriers, tensions, *worst_of(rows, times, of_plan=True))
 
 
 def _windings(

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from towline import Dynamics, InputError, Robot, load, plan, simulate
-from towline.control import ComputedTorque, Predictive, longest_stop, references, stop
+from towline.control import ComputedTorque, Predictive, Stop, longest_stop, references, stop
 from towline.control.planned_references import planned
+from towline.control.trajectory import read_trajectory
 from towline.models import points
 from towline.models.trajectory import Trajectory
 from towline.statics.continuation import continued
@@ -57,6 +58,24 @@ def test_stops_of_teams_obey_the_equations_of_motion(made):
             np.testing.assert_allclose(motion[0], first, atol=1e-6)
         assert np.abs(its.platform[1][-1]).max() < 1e-3
         assert np.abs(its.carriers[1][-1]).max() < 1e-3
+
+
+@pytest.mark.parametrize("room", [1.15, 1.3, 1.5])
+def test_no_stop_of_a_plan_with_room_exceeds_accelerations_between_its_instants(made, room):
+    """A follower gets the polynomials through the instants; they exceeded this limit by up to a tenth."""
+    robot, found = made
+    trajectory = planned(found)[1]
+    most = room * np.linalg.norm(trajectory.at(np.linspace(0, 3, 3001))[1][2][..., :3], axis=-1).max()
+    carriers = [each.model_dump() | {"acceleration_max": float(most)} for each in robot.carriers]
+    tight = Robot.model_validate({**robot.model_dump(), "carriers": carriers})
+    for begins in (0.3, 0.7, 1.1, 1.5, 1.6, 1.8, 2.2, 2.3, 2.95, 2.97):
+        its = team_stop_along(tight, trajectory, begins)
+        assert its.limit == ""
+        assert its.tau[-1] <= found.duration + 1e-9  # where accelerations jump to zero
+        halt = Stop(tight, begins, 3.0, its.times, its.platform, its.carriers, its.tensions, None)
+        fine = read_trajectory(tight, halt, None).at(np.linspace(0, halt.duration, 4001)[:-1])[1]
+        assert np.linalg.norm(fine[2][..., :3], axis=-1).max() <= most
+        assert (its.tensions >= robot.t_min).all()
 
 
 def test_a_team_stops_in_a_simulation(made):
