@@ -70,7 +70,7 @@ def _in_words(kind: type) -> str:
 class Part(Displayed, BaseModel):
     """The base of all parts: they are frozen, and an unknown key is an error."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     def __init__(self, /, **fields: Any):
         """Check the fields, with the errors of `model_validate`."""

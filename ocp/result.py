@@ -197,9 +197,8 @@ class PlanData(Displayed):
         audit, scenario = self.audit, self.scenario
         some = slice(None, None, max(len(audit.times) // MOST_WARNED, 1))
         seen = Instants(scenario.dynamics, audit.times[some], audit.motion.pose[some], audit.carriers.pose[some])
-        limited = [values[some] for values in audit.limited]
-        inside = into_places(seen, scenario.limits.all, limited)
-        inside += between_points(seen, scenario.limits.all, limited)
+        limited = partial(audit.limiting, some)
+        inside = into_places(seen, scenario.limits, limited) + between_points(seen, scenario.limits, limited)
         others = (*outside_frame(seen), *short_cables(seen), *fixed_cables(seen, audit.tensions[some]))
         others += tuple(into_each_other(seen))
         if scenario.task.base.kind == "free":

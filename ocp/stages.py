@@ -15,6 +15,8 @@ import time
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from ..base.text import quantity
 from .audits.audit import audit, other_tensions_exist, other_tensions_may_pass
 from .audits.violation import cost, relative_violation
@@ -26,16 +28,20 @@ from .proofs.infeasible_ends import infeasible_ends
 from .proofs.too_little_power import too_little_power
 from .search.feasible_changes import feasible_changes
 from .search.homotopy import from_easier
+from .search.largest_share import exceeds
 from .search.reference import about_better_reference
 from .search.refinement import refine
 from .search.search import Search
-from .search.time_law import BOUND, audit_of_law
+from .search.time_law import BOUND, audit_of_law, has_own_law
 from .tasks.deviation import Deviation
 from .tasks.ends import between_fixed_values
 from .tasks.status import MotionStatus
 from .tasks.wind_set import WindDisc
+from .timing.timed_task import ACCELERATIONS, SPEEDS
 
 NO_SLACK = 1e-3  # of the weight: a motion with less missing at its nodes is a start for another try
+PLACES = 201  # of a motion by its own time law
+FALLING = {*SPEEDS, *ACCELERATIONS, "platform_turn", "cable_jerk"} - {"platform_lateral_acceleration"}  # with 1 / T^k
 UNPROVEN = "no tensions exist in winds a little stronger than the task's; for the task's own winds this is not proven"
 
 
@@ -122,31 +128,37 @@ def _blocked(search: Search) -> Plan | None:
 def _time_law(search: Search) -> tuple[Plan | None, bool]:
     """Plan a motion with only the time law free; return also whether the path's own time law may be feasible.
 
-    The plan is feasible, or proves that no time law is; otherwise it is None.
+    The plan is feasible, or proves that no time law is: of all, or of those that the planner may choose, which is the
+    path's own unless the objective has the time. Otherwise it is None.
     """
     scenario, span = search.scenario, search.scenario.duration_range
     if span is None:
         return None, True
-    left = _durations(search)
+    left, slowest = _durations(search), scenario.lasting(span.max)
     own = left is None or left.leave(span.min, span.max)
-    if own and scenario.task.objective.time is None:
+    given = scenario.task.objective.time is None or has_own_law(scenario)
+    if own and given:
+        proven = scenario.stretches and exceeds(slowest, np.linspace(0.0, span.max, PLACES)).any()
+    else:
+        with search.stage("timing") as stage:
+            fast, stage.message = search.timing.fastest
+        law = None if fast is None else fast.law
+        if fast is not None and law is not None and fast.feasible and fast.duration <= span.max:
+            if own and fast.duration < span.min:
+                return None, own
+            chosen = scenario.along(law.path.resting_until(span.min), max(fast.duration, span.min))
+            known = audit_of_law(fast, chosen) if chosen.path is law.path else None
+            audit = search.audit_motion(chosen, None, "audit with the fastest time law", known)
+            return (Plan(chosen, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0) if audit.passed else None), own
+        too_slow = fast is not None and fast.feasible and BOUND * fast.duration > span.max
+        proven = not own and (given or too_slow or (law is not None and law.certificate is not None))
+    if not proven:
         return None, own
-    with search.stage("timing") as stage:
-        fast, stage.message = search.timing.fastest
-    if fast is None or fast.law is None:
-        return None, own
-    if fast.feasible and span.min <= fast.duration <= span.max:
-        chosen = scenario.along(fast.law.path, fast.duration)
-        known = audit_of_law(fast, scenario)
-        audit = search.audit_motion(chosen, None, "audit with the fastest time law", known)
-        return (Plan(chosen, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0) if audit.passed else None), own
-    too_slow = fast.feasible and BOUND * fast.duration > span.max
-    if own or not (too_slow or fast.law.certificate is not None):
-        return None, own
-    # No law is fast enough, or there is a place that no law passes. The slowest motion is the closest one.
-    slowest = scenario.lasting(span.max)
+    # The slowest motion is the closest one if no law is fast enough, none passes some place, or the own is too fast.
     audit = search.audit_motion(slowest, None, f"audit, duration {quantity(span.max, 's')}")
-    if audit.passed:
+    if own:
+        audit = replace(audit, excess=[each for each in audit.excess if each.limit in FALLING], certificate=None)
+    if audit.passed or (own and not audit.excess):
         return None, True
     offers = partial(feasible_changes, search, slowest, None, audit)
     return Plan(slowest, MotionStatus.INFEASIBLE, None, audit, 0.0, 0.0, offers=offers), own

@@ -114,6 +114,42 @@ def test_a_motion_that_is_too_fast_tells_a_duration_that_would_do():
     assert plan(robot, {"path": LIFT, "duration": found.relaxed.possible}).feasible
 
 
+@pytest.mark.parametrize(("name", "peak"), [("platform_speed", 35 / 16), ("platform_acceleration", None)])
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_a_time_law_that_is_too_fast_in_the_longest_duration_is_proven_infeasible(name, peak, share):
+    """A lift of 1 m by the smooth line's own time law, of closed form, in at most 2 s: no objective chooses another."""
+    most = peak / 2 if peak else largest_acceleration(np.linspace(0, 1, 100_001)).max() / 4
+    task = {"path": LIFT, "duration": {"min": 0.5, "max": 2}, "limits": {name: share * most}}
+    found = plan(hoist(4.0), task)
+    assert found.status is (MotionStatus.FEASIBLE if share > 1 else MotionStatus.INFEASIBLE)
+    if share < 1:
+        (excess,) = found.audit.excess
+        assert excess.limit == name
+        assert excess.value == pytest.approx(most, rel=1e-5)
+        assert plan(hoist(4.0), task | {"objective": {"time": 1}}).feasible  # another law is not as fast
+
+
+def test_what_only_a_fast_motion_passes_is_passed_and_followed_by_a_rest():
+    """Two cables hold 1 kg at the top of an arch if it is so fast that less than its weight is left to hold."""
+    data = load("point-mass-3").model_dump(mode="json")
+    cables = [{**data["cables"][0], "anchor": [x, 0, 0], "t_min": 0.0, "t_max": 18.0} for x in (-1, 1)]
+    platform = {"mass": 1.0, "dof": ["x", "z"], "home": [0, 0, -0.6, 0, 0, 0]}
+    robot = Robot.model_validate({**data, "platform": platform, "cables": cables})
+    depth = 0.25
+    assert GRAVITY / (2 * depth / np.hypot(1, depth)) > 18.0  # each tension if it rests at the top
+    path = {"kind": "waypoints", "shape": "spline", "points": [[-0.5, 0, -0.6], [0, 0, -depth], [0.5, 0, -0.6]]}
+    found = plan(robot, {"path": path, "duration": {"min": 5, "max": 8}, "objective": {"time": 1}})
+    assert found.feasible
+    assert found.duration == 5.0
+    times, position = found.audit.times, found.audit.motion.pose[:, :3]
+    assert (np.abs(position[times > 2] - [0.5, 0, -0.6]) < 1e-9).all()
+    lines = np.array([[-1, 0, 0], [1, 0, 0]]) - position[:, None]
+    lines /= np.linalg.norm(lines, axis=2, keepdims=True)
+    force = np.einsum("nm,nmi->ni", found.audit.tensions, lines)
+    assert np.allclose(force - [0, 0, GRAVITY], found.audit.motion.acceleration[:, :3], atol=1e-6)
+    assert found.audit.tensions.max() <= 18.0 + 1e-6
+
+
 def test_missing_spans_are_those_in_which_the_acceleration_is_too_large():
     """Half the shortest duration: too much force up in the first half, too much down in the second."""
     robot, weight = hoist(2.0), hoist(2.0).weight

@@ -46,7 +46,7 @@ class Audit(Displayed):
     # The one with the largest shortfall, with its time, and its wind if the task has a box of winds; None if all exist.
     certificate: Certificate | None = None
     supports: np.ndarray | None = None  # forces of the ground, (n, s) [N], zero while it hangs; None without ground
-    limiting: Callable[[], list[np.ndarray]] = field(default=list, repr=False, compare=False)  # computes `limited`
+    limiting: Callable[..., list[np.ndarray]] = field(default=list, repr=False, compare=False)  # `limited`, of rows too
     drifting: Callable[[], Drift] | None = field(default=None, repr=False, compare=False)  # computes `drift`
 
     @cached_property

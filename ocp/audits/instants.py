@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from ...base.display import Displayed
 from ...base.errors import InputError
 from ...solvers import Certificate
-from ..limits import Rate
+from ..limits import Limit, Rate
 from ..limits.distance import Distance
 from ..tasks.deviation import Deviation
 from ..tasks.paths import Motion
@@ -124,14 +125,22 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
 
 
 def limited(
-    scenario: Scenario, times: np.ndarray, motion: Motion, carriers: Motion, values: list[np.ndarray]
+    scenario: Scenario,
+    times: np.ndarray,
+    motion: Motion,
+    carriers: Motion,
+    values: list[np.ndarray],
+    rows: np.ndarray | slice = slice(None),
+    limits: Iterable[Limit] | None = None,
 ) -> list[np.ndarray]:
-    """Return the values of `Instants`, distances included."""
+    """Return the values of some `rows` of `Instants`, distances included, of some `limits`; default: of all."""
+    times = times[rows]
+    motion, carriers = (Motion(*(part[rows] for part in each)) for each in (motion, carriers))
     return [
         np.where(scenario.in_force(limit, times)[:, None], scenario.limits.distances(limit, motion, carriers), np.nan)
         if isinstance(limit, Distance)
-        else its
-        for limit, its in zip(scenario.limits, values, strict=True)
+        else values[scenario.limits.all.index(limit)][rows]
+        for limit in (scenario.limits if limits is None else limits)
     ]
 
 

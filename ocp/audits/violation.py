@@ -43,8 +43,8 @@ def cost(plan: PlanData) -> float:
 def _of_soft_limits(scenario: Scenario, audit: Audit) -> float:
     """Return what exceeding the soft limits costs: at each instant the largest excess over those of one name."""
     beyond: dict[str, np.ndarray] = {}
-    for limit, values in zip(scenario.limits, audit.limited, strict=True):
-        if limit.soft is not None:
-            excess = np.maximum(limit.low - values, values - limit.high).max(axis=1) / limit.soft
-            beyond[limit.name] = np.fmax(beyond.get(limit.name, 0.0), excess)  # nan: not in force
+    soft = [limit for limit in scenario.limits if limit.soft is not None]
+    for limit, values in zip(soft, audit.limiting(limits=soft) if soft else [], strict=True):
+        excess = np.maximum(limit.low - values, values - limit.high).max(axis=1) / limit.soft
+        beyond[limit.name] = np.fmax(beyond.get(limit.name, 0.0), excess)  # nan: not in force
     return float(sum((each**2).mean() for each in beyond.values()))

@@ -49,11 +49,11 @@ def drawings(plan: PlanData, trajectory: xr.Dataset) -> dict[str, Drawing]:
 def limited(plan: PlanData, rows: np.ndarray) -> list[Limited]:
     """Return the limits of task, robot and carriers at the audit's `rows`, limits of one name and bound together."""
     gathered: dict[tuple[str, str, float, float], tuple[list[str], list[np.ndarray]]] = {}
-    for limit, values in zip(plan.scenario.limits, plan.audit.limited, strict=True):
-        if limit.shown:
-            labels, curves = gathered.setdefault((limit.title, limit.unit, limit.low, limit.high), ([], []))
-            labels += limit.labels
-            curves.append(values[rows])
+    shown = [limit for limit in plan.scenario.limits if limit.shown]
+    for limit, values in zip(shown, plan.audit.limiting(rows, shown), strict=True):
+        labels, curves = gathered.setdefault((limit.title, limit.unit, limit.low, limit.high), ([], []))
+        labels += limit.labels
+        curves.append(values)
     return [
         Limited(name, unit, labels, np.hstack(curves), low, high)
         for (name, unit, low, high), (labels, curves) in gathered.items()

@@ -283,8 +283,9 @@ def _carriers(plan: PlanData) -> list[Fact]:
         )
         facts.append((carrier.name, _against(speed, limits.get("carrier_speed"), "m/s", times)))
         facts.append(("", _against(acceleration, limits.get("carrier_acceleration"), "m/s^2", times)))
-        for limit, values in zip(plan.scenario.limits, plan.audit.limited, strict=True):
+        for limit in plan.scenario.limits:
             if limit.name == "carrier_tilt" and limit.labels == (carrier.name,):
+                (values,) = plan.audit.limiting(limits=[limit])
                 tilt, most = np.degrees(values[:, 0]), float(np.degrees(limit.high))
                 facts.append(("", _against(tilt, most, "degrees of tilt", times)))
     return facts

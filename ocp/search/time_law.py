@@ -50,9 +50,7 @@ def fastest(scenario: Scenario) -> tuple[Plan | None, str]:
         return None, "not computed: carriers have time laws of their own"
     if scenario.wind_set is not None:
         return None, "not computed: in moving air the drag is not proportional to the square of the speed"
-    path = task.path
-    own = path.natural_duration is not None or getattr(path, "timing", "") == "uniform"
-    if own or not isinstance(path, LinePath | WaypointPath):
+    if has_own_law(scenario):
         return None, f"not computed: the path of kind {task.path.kind} has a time law of its own"
     hard = {name: getattr(task.limits, name) for name in WITHOUT_POWER if name not in task.limits.soft}
     alone = {"limits": TaskLimits(**hard), "margin": scenario.hard_margin, "tube": Tube(), "stop_within": None}
@@ -64,6 +62,13 @@ def fastest(scenario: Scenario) -> tuple[Plan | None, str]:
         return found, f"the fastest time law takes {quantity(found.duration, 's', 6)}"
     at = 0.0 if found.law is None else found.law.at or 0.0
     return found, f"{found.status.value} at {quantity(100 * at, '%', 3)} of the path"
+
+
+def has_own_law(scenario: Scenario) -> bool:
+    """Return whether no other time law is chosen for a path."""
+    path = scenario.task.path
+    own = path.natural_duration is not None or getattr(path, "timing", "") == "uniform"
+    return own or not isinstance(path, LinePath | WaypointPath)
 
 
 def audit_of_law(law: Plan, scenario: Scenario) -> Audit | None:

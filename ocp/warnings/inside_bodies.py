@@ -1,6 +1,6 @@
 """Carriers whose bodies enter keep-out regions or overlap: `into_places`, `into_each_other`."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -15,22 +15,22 @@ from ..limits.places import CarriersOutside, PlatformOutside
 from .instants import Instants
 
 LEAST = 1e-4  # [m]: less is within the tolerances of a program
+Limited = Callable[[Sequence[Limit]], list[np.ndarray]]
 Meeting = tuple[float, str]  # by how much [m], and the sentence
 MOST = 200  # instants that are looked at, or less than twice as many
 ENTERED = 1e-3  # [m]: less inside is not worth a sentence
 
 
-def into_places(seen: Instants, limits: Sequence[Limit], limited: Sequence[np.ndarray]) -> list[str]:
+def into_places(seen: Instants, limits: Iterable[Limit], limited: Limited) -> list[str]:
     """Return a sentence if a carrier enters a region, because the task states less than the radius of its body.
 
-    `limits`, `limited`: limits of the task, and what they bound at the instants, (n, k) each.
+    `limited` returns what some of the task's `limits` bound at the instants, (n, k) each.
     """
-    robot, meetings = seen.robot, []
-    for limit, values in zip(limits, limited, strict=True):
-        if not isinstance(limit, CarriersOutside):
-            continue
+    robot, radii, meetings = seen.robot, seen.robot.carrier_radius, []
+    less = [limit for limit in limits if isinstance(limit, CarriersOutside) and limit.low < radii.max() - LEAST]
+    for limit, values in zip(less, limited(less), strict=True):
         for column, index in enumerate(limit.which):
-            radius, row = robot.carrier_radius[index], int(values[:, column].argmin())
+            radius, row = radii[index], int(values[:, column].argmin())
             if limit.low < radius - LEAST and values[row, column] < radius - LEAST:
                 name, distance = robot.carriers[index].name, quantity(abs(values[row, column]), "m", 3)
                 comes = f"comes within {distance} of" if values[row, column] >= 0 else f"is {distance} inside"
@@ -63,18 +63,21 @@ def _worst(meetings: list[Meeting], mend: str) -> list[str]:
     return [f"{max(meetings)[1]}{others}; {mend}"]
 
 
-def between_points(seen: Instants, limits: Sequence[Limit], limited: Sequence[np.ndarray]) -> list[str]:
+def between_points(seen: Instants, limits: Iterable[Limit], limited: Limited) -> list[str]:
     """Return a sentence if a region enters the hull of centre of mass and attachments, all of which stay outside.
 
-    `limits`, `limited`: limits of the task, and what they bound at the instants, (n, k) each.
+    `limited` returns what some of the task's `limits` bound at the instants, (n, k) each.
     """
     robot = seen.robot
+    if robot.platform.body is not None:
+        return []
+    outside = [limit for limit in limits if isinstance(limit, PlatformOutside)]
     kept = [
         (limit, its.min(axis=1))
-        for limit, its in zip(limits, limited, strict=True)
-        if isinstance(limit, PlatformOutside) and (its >= limit.low - limit.tolerance).all()
+        for limit, its in zip(outside, limited(outside), strict=True)
+        if (its >= limit.low - limit.tolerance).all()
     ]
-    if robot.platform.body is not None or not kept:
+    if not kept:
         return []
     points = np.vstack([robot.platform.com, robot.attachments])
     try:

@@ -88,6 +88,13 @@ class TimedPath(PathBase):
     def natural_duration(self) -> float | None:
         return self.least if self.smoothing is None else None
 
+    def resting_until(self, seconds: float) -> Self:
+        """Return the path with a rest at its end if it would last less than `seconds`."""
+        if self.least >= seconds:
+            return self
+        dwell = (*(self.dwell or [0.0] * len(self.s))[:-1], seconds - self.least + (self.dwell or (0.0,))[-1])
+        return self.model_copy(update={"dwell": dwell})
+
     def law(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return s, ds/dt [1/s] and d2s/dt2 [1/s^2] at `times` [s], (n,) each."""
         return self._law.at(times)
