@@ -13,7 +13,8 @@ much of the lag as T permits where the noise permits no more.
 
 The attitude loops of flying carriers, phi'' = -2 h phi' - h^2 phi, are stable up to h lag = 2 with drives that lag
 (Routh), up to h delay = 0.647 with late states (their phase where the gain is 1), and up to h period = 1 with states
-that are held for a period (Jury), each alone. Together they keep
+that are held for a period (Jury), each alone. States are predicted over their delay: exactly if they have a time, but a
+delay that is told may be wrong by 30 %, which makes loops unstable as 0.6 of it would. Together they keep
 
     h (lag / 2 + (delay / 0.647 + period) / 1.5) <= 0.5        h >= 6 k
 
@@ -34,6 +35,7 @@ from ..base.inputs import number
 from ..base.text import quantity
 from ..models.parsing import validate
 from ..models.robot import Robot
+from .controllability import is_underactuated
 from .lag import ROTORS_KEEP, WINCHES_KEEP
 from .late_states import OLDEST
 from .noise import Noise
@@ -47,6 +49,7 @@ DELAY, PERIOD = 0.647, 1.0  # times the inverse of h: where a late or a held sta
 LAG = UNSTABLE / 2  # as late as a period that leaves attitude loops the same margin
 CALM = 0.03  # the same where winches have to follow the noise, as long as it leaves `LEAST` of the usual bandwidths
 MISTOLD = 0.8  # of a known delay over which states are predicted: more than twice what may be wrong about it
+TURNED = 0.6  # the same for attitude loops
 LEAST = 0.1  # of the usual bandwidths: with less a robot does not follow
 READINGS = 1e3  # [1/s], without a rate
 GRAVITY, TINY = 9.81, 1e-12  # [m/s^2]; what divides
@@ -132,7 +135,7 @@ def bandwidths_for(
 
 def _attitude_for(robot: Robot, errors: "_Errors | None", lag: float, given: float | None) -> float:
     """Return the bandwidth of attitude loops, `given` or the largest that lags of rotors and sensors permit."""
-    delay, period = (0.0, 0.0) if errors is None else (errors.age - errors.period / 2, errors.period)
+    delay, period = (0.0, 0.0) if errors is None else (errors.turned, errors.period)
     left, by_sensors = min(lag, ROTORS_KEEP), (delay / DELAY + period / PERIOD) / UNSTABLE
     late, weight = left + delay + period / 2, left / 2 + by_sensors
     if not late or not any(carrier.actuators for carrier in robot.carriers):
@@ -188,8 +191,8 @@ def age_of(noise: Noise) -> float:
 class _Errors(NamedTuple):
     """Errors of sensors: ages [s], and standard deviations of positions [m] and velocities [m/s]."""
 
-    age: float  # of all states, on average
-    period: float  # for which they are held
+    turned: float  # delay that attitude loops have in spite of predictions
+    period: float  # for which states are held
     late: float  # what of the age and of lags is not predicted
     position: float
     velocities: np.ndarray  # (2,), of the position and by rates of angles
@@ -222,8 +225,10 @@ def _errors_of(noise: Noise, robot: Robot) -> _Errors:
     if noise.differenced:
         late, velocity = late + step / 2, np.hypot(velocity, np.sqrt(2) * position / step)
     late += WINCHES_KEEP if robot.fixed_lengths is None else 0.0
-    strict = robot.fixed_lengths is None and robot.m >= len(robot.platform.dof)
+    strict = robot.fixed_lengths is None and not is_underactuated(robot)
     of_tensions = ripple(robot, limits_of(robot, None), np.repeat(velocity, 3)) if strict and velocity.any() else None
     most = 0.0 if of_tensions is None else OFTEN * float(np.linalg.norm(of_tensions, axis=1).max())
     limit = CALM if strict else NOISE
-    return _Errors(age, step if noise.rate else 0.0, late, float((size * position).max()), size * velocity, limit, most)
+    turned = 0.0 if noise.stamped else TURNED * noise.delay if age <= OLDEST else noise.delay
+    far, held = float((size * position).max()), step if noise.rate else 0.0
+    return _Errors(turned, held, late, far, size * velocity, limit, most)

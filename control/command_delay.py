@@ -15,24 +15,24 @@ class Pending:
         self.reset(0)
 
     def reset(self, count: int) -> None:
-        """Forget all commands, of `count` numbers each."""
-        self._time, self._count, self._many = 0.0, count, MANY
+        """Forget all commands, of `count` numbers each; `time` [s] has passed since."""
+        self.time, self._count, self._many = 0.0, count, MANY
         self._commands: deque[tuple[float, bytes]] = deque()
 
     def wait(self, dt: float) -> None:
         """Let `dt` [s] pass."""
-        self._time += dt
+        self.time += dt
 
     def add(self, command: bytes) -> None:
         """Add a command from now on, the bytes of (count,) numbers."""
-        self._commands.append((self._time, command))
+        self._commands.append((self.time, command))
         if len(self._commands) >= self._many:
             self._forget()
 
     def _forget(self) -> None:
         """Forget commands that are too old; half of the queue's next length are new."""
         commands = self._commands
-        while len(commands) > 1 and commands[1][0] <= self._time - self._kept:
+        while len(commands) > 1 and commands[1][0] <= self.time - self._kept:
             commands.popleft()
         self._many = max(MANY, 2 * len(commands))
 
@@ -41,7 +41,7 @@ class Pending:
 
         What was not commanded is zero.
         """
-        edges = self._time - ago + part * np.arange(parts + 1)
+        edges = self.time - ago + part * np.arange(parts + 1)
         first, last = float(edges[0]), float(edges[-1])
         begins: list[float] = []
         values: list[bytes] = []

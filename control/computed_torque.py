@@ -1,7 +1,6 @@
 """`ComputedTorque`: desired acceleration, the wrench required for it, and the tensions that produce this wrench."""
 
 from collections.abc import Mapping
-from math import ceil
 from typing import Any
 from warnings import warn
 
@@ -15,9 +14,9 @@ from ..models.files import AnyRobot, as_robot
 from ..models.record import record_of
 from ..solvers.in_place import InPlace
 from .as_floats import ROUNDING, as_floats, is_time, measured_at, rows_of
-from .bandwidths import CASCADE, DELAY, HELD, LAG, PERIOD, SWINGING, age_of, bandwidths_for, noise_of, place_for
+from .bandwidths import CASCADE, HELD, SWINGING, age_of, bandwidths_for, noise_of, place_for
 from .carried_load import CarriedLoad
-from .controllability import uncontrolled
+from .controllability import is_underactuated, uncontrolled
 from .controller import NOTHING, NOWHERE, PLANNED, SHIFTED, SOFT, Command, Controller, OneAtATime, Reference, State
 from .deviation import Deviation
 from .fallback import NEGLIGIBLE, answer_others
@@ -44,29 +43,33 @@ class ComputedTorque(Controller):
     command: these tensions if they exist (status "as planned"), otherwise those with the closest wrench ("soft
     wrench"). While state or reference contain nan, the last command moves to the planned tensions as fast as the rate
     permits, and quadrotors finish the turn that they have begun ("hold"). A wrench error up to 0.1 % of the robot's
-    weight is accepted; with fewer cables than degrees of freedom, 0.1 % along each cable and 10 % in all. Carriers
-    follow the reference, or deviate from it within their `reach` to help the tensions. This damps the swing of loads of
-    towing robots and of teams of quadrotors, with fewer cables than degrees of freedom. Quadrotors have separate loops
-    for position and attitude (core/control/thrusts.c).
+    weight is accepted. Carriers follow the reference, or deviate from it within their `reach` to help the tensions.
+    Quadrotors have separate loops for position and attitude (core/control/thrusts.c).
+
+    A robot is underactuated if it has fewer cables than degrees of freedom, or if the cables of a team cannot turn its
+    platform about some axis at home. Its carriers then correct errors too, which damps the swing of loads. Its cables
+    keep their tensions in directions in which they hardly change the wrench, and a wrench error of 0.1 % of the weight
+    along each cable and 10 % in all is accepted.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
         bandwidth: Bandwidth b of the error's decay [rad/s], a number or one for each coordinate of the pose: Kp = b^2.
-            Default: 10, but 1.5 with fewer cables than degrees of freedom, because the load swings with its carriers;
+            Default: 10, but 1.5 if the robot is underactuated, because the load swings with its carriers;
             see `sensors`. If the first two steps, or three in a row, are more than 0.6 / b apart, the defaults of
             `bandwidth` and `observer` are lowered, because the loop is unstable from 1 / b on. Both are restored after
             two steps that are closer together. A given bandwidth is kept, with a warning. If carriers fly, all
             bandwidths are lowered by the same factor, because their attitude loops need steps of at most 0.75 /
-            `attitude`, less 1.5 times the mean age of the states and 0.75 times the remainder of `rotor_lag`. Other
-            carriers that correct errors need steps of at most 0.75 / `carrier_bandwidth`.
+            `attitude`, less 1.5 times the mean time for which states are held (if their delay is only told: 0.93 times
+            that), and 0.75 times the remainder of `rotor_lag`. Other carriers that correct errors need steps of at most
+            0.75 / `carrier_bandwidth`.
         damping: Damping ratio z: Kd = 2 z b.
         integral: Ki [1/s^3], a number or one for each coordinate. It pauses while the status is not "as planned".
         observer: Bandwidth of the estimates of the disturbance and of forces on flying carriers [rad/s]; 0: no
             estimates. Default: 10; see `sensors`.
         rate: Largest rate of change of tensions [N/s], a number or one for each cable (default: no limit).
         reach: Largest deviation of carriers from their reference to help the tensions (see
-            `core/control/compensation.c`): position [m] and attitude [rad]. Default: 0, but 0.5 m with fewer cables
-            than degrees of freedom.
+            `core/control/compensation.c`): position [m] and attitude [rad]. Default: 0, but 0.5 m if the robot is
+            underactuated.
         carrier_bandwidth, carrier_acceleration: Bandwidth of the carriers' deviation [rad/s], and its largest
             acceleration [m/s^2 and rad/s^2]. Default of the bandwidth: 6, but at most a sixth of `attitude`, and a
             quarter of `place` if the robot has flying carriers and at least as many cables as degrees of freedom: with
@@ -118,7 +121,7 @@ class ComputedTorque(Controller):
         sensors: Noise | Mapping[str, Any] | None = None,
     ):
         self.robot, self._alone = as_robot(robot), OneAtATime()
-        few, self._limits = self.robot.m < len(self.robot.platform.dof), limits_of(self.robot, rate)
+        few, self._limits = is_underactuated(self.robot), limits_of(self.robot, rate)
         rotors, usual = number("rotor_lag", rotor_lag, 0.0, 0.1), SWINGING if few else HELD
         loops = bandwidths_for(self.robot, usual, sensors, rotors, bandwidth, observer, attitude)
         held, age = place_for(loops.attitude, place), 0.0 if sensors is None else age_of(noise_of(sensors))
@@ -132,8 +135,8 @@ class ComputedTorque(Controller):
         self._reach = far = reach_of(self.robot, (0.5 if few else 0.0, 0.0) if reach is None else reach)
         set_reach(self._settings, far)
         self._settings["attitude"] = self._attitude = loops.attitude
-        self._flies, self._turns_late = bool(self._settings["by_wrench"].any()), LAG * min(rotors, ROTORS_KEEP)
-        self._slow_loops = SlowLoops(self._settings, bandwidth is None, usual.bandwidth)
+        self._flies = bool(self._settings["by_wrench"].any())
+        self._slow_loops = SlowLoops(self._settings, bandwidth is None, usual.bandwidth, min(rotors, ROTORS_KEEP))
         self._usual_longest = self._slow_loops.longest
         loop, lag = number("tension_loop", tension_loop, 0.0, 1e3), number("tension_lag", tension_lag, 0.0, 1.0)
         self._ahead = tension_lead(self.robot, self._limits, lag, rotors)
@@ -185,10 +188,11 @@ class ComputedTorque(Controller):
         """Create the memory for one robot, or for each row of a batch."""
         m, count = self.robot.m, len(self.robot.carriers)
         self._time: float | None = None
-        self._elapsed = self._age = self._aged_for = 0.0
+        self._elapsed = 0.0
+        self._slow_loops.reset()
         self._carried.reset()
         self._robot = record_of(self.robot)
-        self._seen, self._sent_lately = 0.0, LateStates(rows * m)
+        self._seen = 0.0
         self._late: np.ndarray | None = None  # motions when they were measured, if that is not now
         self._accelerations = bytes(8 * rows * count * 6)  # of carriers, as ordered last
         self._otherwise = np.zeros((rows, m))  # measured minus commanded tensions, over the age of states [N]
@@ -199,8 +203,9 @@ class ComputedTorque(Controller):
         ComputedTorque._speed_up(self)
         self._of_carriers = np.zeros((rows, count), CARRIER)
         self._actuation = np.zeros((rows, count, max(len(carrier.actuators) for carrier in self.robot.carriers)))
+        self._sent_lately = LateStates(rows * m, self._actuation)
         self._turning = np.zeros(rows, TURNING) if self._flies else None
-        self._problems = problems = InPlace(rows, 6, m, self.robot.length)
+        self._problems = problems = InPlace(rows, 6, m, self.robot.length, bool(self._settings["corrects"]))
         memory = self._cables, self._platform, self._of_carriers
         self._arrays = self._measured, self._wanted, self._carriers, *memory, problems.memory
         for part in (self._loop, self._ahead, self._lead):
@@ -219,7 +224,7 @@ class ComputedTorque(Controller):
     def _step(self, time: float, state: State, reference: Reference) -> Command:
         _, state, reference = self._measure(time, state, reference, self._problems.solves)
         problems, proof = self._problems, self._nowhere
-        if self._optimal == len(self._wanted):
+        if self._optimal == len(self._wanted) and problems.is_exact:
             if self._paused:
                 self._platform["integrates"] = 1
             self._paused = False
@@ -265,7 +270,7 @@ class ComputedTorque(Controller):
         self._senses = state.tensions is not None
         seen = time - self._known_age if state.time is None else measured_at(state.time, time)
         since = 0.0 if self._time is None else seen - self._seen
-        late = self._late_by(time - seen, dt) if self._flies else 0.0
+        late = self._slow_loops.late_by(time - seen, state.time is None, since, dt) if self._flies else 0.0
         if dt + late > self._longest and not 0 < self._elapsed <= self._longest - late:
             self._slow_down(min(dt, self._elapsed or dt), late)
         elif self._usual_longest < self._longest < np.inf and 0 < max(dt, self._elapsed) <= self._usual_longest - late:
@@ -273,6 +278,8 @@ class ComputedTorque(Controller):
         own, scales = (self._robot, self._settings), (self._problems.length, *self._deviation.most)
         if self._ahead is not None:
             self._ahead.pass_time(dt, self._cables["given"])
+        if self._lead is not None:
+            self._lead.turn(dt, self._actuation, self._of_carriers["ordered"])
         given, observes = self._cables["given"].tobytes(), self._carried.is_later(seen)
         fixed = dt, since if observes else 0.0, *scales, solves
         if time - seen <= ROUNDING and since == dt and observes:
@@ -295,7 +302,7 @@ class ComputedTorque(Controller):
             self._sent_lately.commanded(cables, age, since, dt, self._senses)
             models = self._carried.records_between(seen, time)
             memory = self._measured, self._otherwise, self._platform["disturbance"], self._accelerations
-            late = self._sent_lately.move_on(age, models, *memory)
+            late = self._sent_lately.move_on(age, models, *memory, flies=self._flies)
             seen_so = self._measured.copy() if late is None else late
             done = control_step(*fixed, None, None, *own, late if observes else seen_so, *self._arrays)
             self._late = seen_so
@@ -314,15 +321,6 @@ class ComputedTorque(Controller):
         self._of_carriers["ordered"] = sender._of_carriers["ordered"]
         if sender._lead is not None and self._lead is not None:
             self._lead.agree(sender._lead)
-
-    def _late_by(self, age: float, dt: float) -> float:
-        """Return the time between steps that delays attitude loops as much as lags and the mean age of states [s].
-
-        The mean is over all states during the first second, because a loop may be unstable with the first ones.
-        """
-        self._aged_for = min(self._aged_for + dt, 1.0)
-        self._age += min(dt / self._aged_for if self._aged_for else 1.0, 1.0) * (min(age, OLDEST) - self._age)
-        return self._turns_late + ceil(1e3 * self._age - ROUNDING) / 1e3 * PERIOD / DELAY
 
     def _slow_down(self, period: float, late: float) -> None:
         """Lower bandwidths for late states and commands that are held for a period [s], or warn of given ones."""
@@ -358,8 +356,6 @@ class ComputedTorque(Controller):
         if self._flies:
             memory = self._cables, self._platform, self._of_carriers, self._turning, self._actuation
             given = self._measured, self._carriers, tensions, *memory
-            if self._lead is not None:
-                self._lead.turn(self._elapsed, self._actuation, self._of_carriers["ordered"])
             lacking = control_thrusts(self._elapsed, self._robot, self._settings, *given)
             actuation = self._actuation.copy() if self._lead is None else self._lead.sent(self._actuation)
             if lacking > self._negligible:

@@ -1,4 +1,4 @@
-"""`uncontrolled`: wrench directions that neither tensions nor carriers can change."""
+"""`uncontrolled`: wrench directions that neither tensions nor carriers can change; `is_underactuated`."""
 
 import numpy as np
 
@@ -8,6 +8,21 @@ from ..statics.distribution import tensions
 
 STEP = 1e-6  # [m, rad], of a difference quotient
 NONE = 1e-6  # of the largest singular value
+WEAK = 0.05  # likewise: cables that hardly turn the platform cannot hold it against disturbances and noise
+
+
+def is_underactuated(robot: Robot) -> bool:
+    """Return whether the tensions at home control fewer directions of the wrench than the platform has freedoms.
+
+    This is so with fewer cables, and for a load below six flying carriers whose cables all point to its axis: nothing
+    turns it about this axis unless carriers move. Cables with winches are taken to control as many as there are cables.
+    """
+    count = len(robot.platform.dof)
+    if robot.m < count or robot.fixed_lengths is None:
+        return robot.m < count
+    scale = np.repeat([1.0, 1 / robot.length], 3) * robot.dof_mask
+    sizes = np.linalg.svd(scale[:, None] * dynamics_of(robot).wrench_matrix(robot.home, robot.carrier_home))[1]
+    return bool(sizes[count - 1] <= WEAK * sizes[0])
 
 
 def uncontrolled(robot: Robot, reach: np.ndarray) -> np.ndarray:

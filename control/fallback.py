@@ -19,7 +19,7 @@ def answer_others(robot: Robot, problems: InPlace, last: np.ndarray) -> np.ndarr
     force, scale = robot.force_scale, robot.wrench_scale
     missing = scale * (problems.w - (problems.A @ problems.tensions[..., None])[..., 0])
     size = np.sqrt(np.einsum("ij,ij->i", missing, missing))
-    if robot.m < len(robot.platform.dof):
+    if problems.is_sparing:
         # What is missing along a cable, tensions would give if limits let them; the rest is for the carriers.
         along = np.abs((scale * missing)[:, None] @ problems.A)[:, 0].max(axis=1)
         nearly = (along <= NEGLIGIBLE * force) & (size <= CARRIED * force)

@@ -119,7 +119,7 @@ class Filtered(Controller):
         bodies = np.zeros((1, 1 + len(state.carrier_pose), 12))
         bodies[0, 0], bodies[0, 1:, :6] = np.append(self._found.pose, self._found.velocity), state.carrier_pose
         still, pulls = np.zeros((len(state.carrier_pose), 6)), np.ascontiguousarray(tensions)[None, None]
-        control_move_on(SHORT, self._carried.change(planned.load, time), np.zeros((1, 6)), pulls, still, bodies)
+        control_move_on(SHORT, self._carried.change(planned.load, time), np.zeros((1, 6)), pulls, None, still, bodies)
         acceleration = (bodies[0, 0, 6:] - self._found.velocity) / SHORT
         if not np.isfinite(acceleration).all():
             return planned[:3]

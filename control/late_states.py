@@ -19,14 +19,17 @@ class LateStates:
     delays beyond the inverse of their bandwidth.
 
     - `count`: number of tensions of all robots, N m.
+    - `actuation`: commands to actuators of all robots, (N, c, a).
     """
 
-    def __init__(self, count: int):
+    def __init__(self, count: int, actuation: np.ndarray):
         self._commanded, self._begun, self._count = Pending(2 * OLDEST), False, count
         self._commanded.reset(count)
+        self._actuated, self._actuation = Pending(2 * OLDEST), actuation
+        self._actuated.reset(actuation.size)
 
     def remember(self, tensions: bytes, dt: float, *before: np.ndarray | None) -> None:
-        """Remember the tensions (N, m) of the last step, `dt` [s] ago.
+        """Remember the tensions (N, m) of the last step, `dt` [s] ago, and what actuators have given since.
 
         At the first step nothing is known but `before`, tensions (N, m) or (m,) that are measured or planned [N]. The
         first ones without nan are taken as the tensions of the time before, or as those of the first step.
@@ -38,6 +41,8 @@ class LateStates:
             self._begun = True
         self._commanded.add(tensions)
         self._commanded.wait(dt)
+        self._actuated.add(self._actuation.tobytes())
+        self._actuated.wait(dt)
 
     def commanded(self, cables: np.ndarray, age: float, since: float, dt: float, senses: bool) -> None:
         """Write what was commanded when states were measured, `age` [s] ago, to records of cables (N, m).
@@ -61,6 +66,7 @@ class LateStates:
         otherwise: np.ndarray,
         disturbance: np.ndarray,
         accelerations: bytes,
+        flies: bool = False,
     ) -> np.ndarray | None:
         """Predict motions, (N, 1 + c, 12), over their `age` [s]; return them as measured if they were predicted.
 
@@ -69,6 +75,7 @@ class LateStates:
         - `otherwise`: differences of tensions from their commands, (N, m) [N].
         - `disturbance`: estimated wrench of the disturbance, (N, 6) [N, N m].
         - `accelerations`: commanded accelerations of the carriers, (N, c, 6).
+        - `flies`: true: flying carriers move by their thrusts and torques, as far as these are known.
         """
         if age <= ROUNDING or not (self._begun or age > OLDEST):
             return None
@@ -79,7 +86,10 @@ class LateStates:
         for robot, lasting in models:
             parts = ceil(lasting / PART)
             tensions = self._commanded.means(age, parts, lasting / parts).reshape(parts, *otherwise.shape) + otherwise
-            given = disturbance.copy(), np.maximum(tensions, 0.0), np.frombuffer(accelerations)
+            flown = self._actuated.means(age, parts, lasting / parts) if flies else None
+            if flown is not None and age > self._actuated.time:
+                flown[: ceil((age - self._actuated.time) * parts / lasting - ROUNDING)] = 0.0
+            given = disturbance.copy(), np.maximum(tensions, 0.0), flown, np.frombuffer(accelerations)
             control_move_on(lasting / parts, robot, *given, motions)
             age -= lasting
         return late

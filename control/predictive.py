@@ -20,6 +20,7 @@ from .as_floats import ROUNDING, as_floats
 from .bandwidths import CASCADE, PATIENT, STILL, TEAM, TOWING, bandwidths_for, noise_of_change
 from .carrier_references import moved_coordinates
 from .computed_torque import ComputedTorque
+from .controllability import is_underactuated
 from .controller import HOLD, OTHERWISE, SHIFTED, SOFT, Command, Reference, State
 from .keep_out import Surroundings
 from .noise import Noise
@@ -119,7 +120,7 @@ class Predictive(ComputedTorque):
         sensors: Noise | Mapping[str, Any] | None = None,
     ):
         the_robot = as_robot(robot)
-        correct = the_robot.fixed_lengths is not None or the_robot.m < len(the_robot.platform.dof)
+        correct = the_robot.fixed_lengths is not None or is_underactuated(the_robot)
         if (given := reach) is None:
             lengths = np.linalg.norm(the_robot.home_anchors - the_robot.home_attachments, axis=1)
             reach = (USUAL_REACH * float(lengths.mean()) if correct else 0.0, 0.0)

@@ -8,6 +8,7 @@ from ..base.errors import InputError
 from ..base.inputs import number, repeated, shown
 from ..models.batch import as_array
 from ..models.robot import Robot
+from .controllability import is_underactuated
 from .records import CONTROLLER
 
 SLOW = 20.0  # [rad/s], with which observers learn that tensions differ from their commands, see core/control/heard.c
@@ -52,7 +53,7 @@ def settings_of(
     settings["observer"] = number("observer", observer, 0.0, 1e4)
     settings["carrier_bandwidth"] = number("carrier_bandwidth", carrier_bandwidth, 0.0, 1e3)
     settings["carrier_acceleration"] = number("carrier_acceleration", carrier_acceleration, 0.0, 1e4)
-    settings["corrects"] = robot.m < len(robot.platform.dof)
+    settings["corrects"] = is_underactuated(robot)
     patience = number("patience", patience, 1e-6, 1e6)
     # Cables of a fixed length have no winch that could be off: their tensions are what carriers make of them.
     has_winches = robot.fixed_lengths is None

@@ -1,8 +1,12 @@
 """`SlowLoops`: bandwidths for commands that are held for a long time."""
 
+from math import ceil
+
 import numpy as np
 
 from .as_floats import ROUNDING
+from .bandwidths import DELAY, LAG, PERIOD, TURNED
+from .late_states import OLDEST
 
 GAINS = "kd", "kp", "ki"  # of the settings, in the order of the powers of the bandwidth
 LOOPS = "attitude", "place", "carrier_bandwidth", "observer"  # the other bandwidths of the settings
@@ -21,16 +25,33 @@ class SlowLoops:
     - `settings`: settings of the controller, which are changed.
     - `adapts`: whether the bandwidth of the error may be lowered.
     - `usual`: default bandwidth of the error [rad/s].
+    - `lag`: time constant that remains of actuators of flying carriers [s].
     """
 
-    def __init__(self, settings: np.ndarray, adapts: bool, usual: float):
-        self._settings, self._adapts = settings, adapts
+    def __init__(self, settings: np.ndarray, adapts: bool, usual: float, lag: float):
+        self._settings, self._adapts, self._lag = settings, adapts, lag
         corrects = bool(settings["corrects"] and settings["reacts"])
         self._inner = "attitude" if settings["by_wrench"].any() else "carrier_bandwidth" if corrects else None
         self._usual = {name: settings[name].copy() for name in (*GAINS, *LOOPS)}
         self._share = usual / float(settings["attitude"])
         held = (HELD_FOR if adapts else 1.0) / max(self._bandwidth, ROUNDING)
         self.longest = min(held, self.longest_inner)  # time between steps without a change [s]
+
+    def reset(self) -> None:
+        """Forget how late states are."""
+        self._late, self._for, self._held = 0.0, 0.0, -np.inf
+
+    def late_by(self, age: float, is_told: bool, since: float, dt: float) -> float:
+        """Return the time between steps that delays attitude loops as much as lags and late states do [s].
+
+        States are predicted over their `age` [s], which may be wrong if it is told, and over the time for which they
+        are held, which begins when one is newer than the last one by some time `since` [s]. The mean is over all states
+        during the first second, because a loop may be unstable with the first ones.
+        """
+        self._held, self._for = 0.0 if since > 0 else self._held + dt, min(self._for + dt, 1.0)
+        late = TURNED * age if is_told else min(max(self._held, 0.0), OLDEST)
+        self._late += min(dt / self._for if self._for else 1.0, 1.0) * (late - self._late)
+        return LAG * self._lag + ceil(1e3 * self._late - ROUNDING) / 1e3 * PERIOD / DELAY
 
     @property
     def _bandwidth(self) -> float:

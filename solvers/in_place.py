@@ -12,6 +12,10 @@ from .solve import solve
 from .status import INFEASIBLE, INVALID, OPTIMAL, SINGULAR, UNSURE
 
 RHO = 1e8  # weight of the squared wrench error in a soft solution, relative to the squared tensions
+# The same where carriers give what the cables cannot. With more, cables that hardly turn the platform would pull as
+# hard as they can for moments that noise requires. With this, the wrench along a cable is off by 0.1 % of the change of
+# its tension.
+SPARING = 1e3
 
 # With up to so many more cables than equations lanes are as quick for one row and several times as quick for many. With
 # more, one row takes 1.5 times as long. A row has the same bits alone and among others: the shape alone decides.
@@ -26,6 +30,8 @@ class InPlace:
 
     - `rows`, `n`, `m`: how many problems, of how many wrench rows and cables.
     - `length`: characteristic length [m] of all problems.
+    - `is_sparing`: whether other forces complete the wrench, so that cables which hardly change it need not.
+    - `is_exact`: whether tensions that give w are taken if they exist; with fewer cables than equations by chance only.
     - `A`, `w`: wrench matrices, shape (rows, n, m), and required wrenches, shape (rows, n), [N] and [N m].
     - `bounds`, `t_ref`: lowest and highest tensions, shape (2, rows, m), and tensions to stay near, shape (rows, m)
       [N].
@@ -36,8 +42,8 @@ class InPlace:
       it, and by how much [N].
     """
 
-    def __init__(self, rows: int, n: int, m: int, length: float):
-        self._shape, self.length = (rows, n, m), float(length)
+    def __init__(self, rows: int, n: int, m: int, length: float, is_sparing: bool = False):
+        self._shape, self.length, self.is_sparing = (rows, n, m), float(length), is_sparing
         # all of these arrays in one, as `core.control_step` writes and solves them;
         self.memory = np.zeros(rows * (n * m + 2 * n + 4 * m + 4))
         self._spare, self._has_core = (np.zeros((rows, n)), np.zeros((rows, 2))), n <= ROWS and m <= CABLES
@@ -52,14 +58,16 @@ class InPlace:
         self.A, self.w, self.bounds, self.t_ref, self.tensions, self.direction, self._info, residual, self.code = parts
         per = np.array([n * m, n, m, m, m, 0, 0], dtype=float)  # one length and equal weights for all rows
         given = (self.A, self.w, *self.bounds, self.t_ref, np.empty(0), np.array([self.length]), per)
-        in_lanes = m - n <= IN_LANES
+        in_lanes, self.is_exact = m - n <= IN_LANES, not self.is_sparing or m < n
         self.solves = 0 if not self._has_core else 2 if in_lanes else 1
         self._exact = (n, m, 0.0, in_lanes, *given, self.tensions, self.direction, self._info, residual, self.code)
-        self._soft = (n, m, RHO, False, *given, self.tensions, *self._spare, residual, self.code)
+        rho = SPARING if self.is_sparing else RHO
+        self._soft = (n, m, rho, False, *given, self.tensions, *self._spare, residual, self.code)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies and pickles hold: the memory without its parts."""
-        return {name: self.__dict__[name] for name in ("_shape", "length", "memory", "_spare", "_has_core")}
+        names = "_shape", "length", "is_sparing", "memory", "_spare", "_has_core"
+        return {name: self.__dict__[name] for name in names}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore the memory, and the arrays as its parts."""
@@ -74,7 +82,7 @@ class InPlace:
     def solve(self) -> bool:
         """Solve all rows, and return whether tensions that give w result for each."""
         self.code.fill(UNSURE)
-        if self._has_core and solve_rows(*self._exact) == len(self.code):
+        if self._has_core and solve_rows(*self._exact) == len(self.code) and self.is_exact:
             return True
         self.solve_others()
         return not self.code.any()
@@ -83,13 +91,13 @@ class InPlace:
         """Answer the rows whose tensions the core did not prove optimal."""
         self._prove_without_core()
         exact = self.code.copy()
-        self.code[(exact != OPTIMAL) & (exact != INVALID)] = UNSURE
+        self.code[(exact != INVALID) & ((exact != OPTIMAL) | (not self.is_exact))] = UNSURE
         if self._has_core:
             solve_rows(*self._soft)
         for row in np.flatnonzero(self.code == UNSURE):
             given = (self.A[row], self.w[row], *self.bounds[:, row])
             problem = TensionProblem(*given, t_ref=self.t_ref[row], length=self.length)
-            solution = solve(problem, "soft-wrench", rho=RHO)
+            solution = solve(problem, "soft-wrench", rho=self._soft[2])
             self.tensions[row] = np.nan if solution.tensions is None else solution.tensions
         self.code[:] = exact
         self.tensions[exact == INVALID] = np.nan

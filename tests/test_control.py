@@ -246,7 +246,7 @@ def test_a_state_of_earlier_is_moved_on_as_the_plant_moves():
     measured[0, 0], measured[0, 1, :6] = np.append(robot.home, velocity), robot.carrier_home
     was = measured.copy()
     parts = np.repeat(commanded, 10, axis=0)[:, None]
-    control_move_on(age / 20, record_of(robot), push[None], parts, bend[None], measured)
+    control_move_on(age / 20, record_of(robot), push[None], parts, None, bend[None], measured)
     exact = np.concatenate([[np.append(now.pose, now.velocity)], np.hstack([now.carrier_pose, now.carrier_velocity])])
     np.testing.assert_allclose(measured[0, :, :6], exact[:, :6], atol=1e-6)
     np.testing.assert_allclose(measured[0, :, 6:], exact[:, 6:], atol=1e-3)

@@ -59,12 +59,21 @@ double towline_write_thrusts(const towline_robot *robot, const towline_controlle
 /* Return how many actuators the carrier with the most has. */
 int towline_most_actuators(const towline_robot *robot);
 
+/* What was commanded in each of some parts of a time, so many numbers apart from part to part. */
+typedef struct {
+    const double *tensions; /* (m) [N] */
+    ptrdiff_t per_tensions;
+    const double *actuation; /* (c, a), as in `towline_flight`; zeros, or NULL: of no carrier, or not known */
+    ptrdiff_t per_actuation;
+    const double *accelerations; /* (c, 6), of all parts, of carriers whose actuation is none */
+} towline_commanded;
+
 /*
- * Move a measured motion (1 + c, 12) on by `dt` [s], `parts` times: the platform by its equations, with a disturbance
- * (6) and tensions (m) that are `per` numbers apart from part to part; carriers by constant accelerations (c, 6).
+ * Move a measured motion (1 + c, 12) on by `dt` [s], `parts` times, with a disturbance (6): platform and flying carriers
+ * by their equations, other carriers by constant accelerations.
  */
-void towline_move_on(const towline_robot *robot, double dt, int parts, const double *disturbance,
-                     const double *tensions, ptrdiff_t per, const double *accelerations, double *motion);
+void towline_move_on(const towline_robot *robot, double dt, int parts, towline_commanded commanded,
+                     const double *disturbance, double *motion);
 
 /* Coordinates of carriers that a predictive controller moves: some of their poses, or those that tethers leave. */
 typedef struct {

@@ -323,7 +323,7 @@ TOWLINE_PY(control_thrusts) {
 }
 
 TOWLINE_PY(control_move_on) {
-    enum { ROBOT, DISTURBANCE, TENSIONS, ACCELERATIONS, MEASURED, ALL };
+    enum { ROBOT, DISTURBANCE, TENSIONS, ACTUATION, ACCELERATIONS, MEASURED, ALL };
     arrays given;
     double dt = 0;
     if (!take_numbers(arguments, count, 1, &dt) || !take(&given, arguments + 1, count - 1, ALL, MEASURED)) {
@@ -335,12 +335,16 @@ TOWLINE_PY(control_move_on) {
     if (fits) {
         const Py_ssize_t m = robot->cables, c = robot->carriers, motions = MOTION * (1 + c);
         const Py_ssize_t rows = given.size[DISTURBANCE] / 6, parts = rows ? given.size[TENSIONS] / (rows * m) : 0;
-        const Py_ssize_t sizes[ALL] = {0, 6, parts * m, 6 * c, motions};
+        const Py_ssize_t each = of[ACTUATION] ? c * towline_most_actuators(robot) : 0;
+        const Py_ssize_t sizes[ALL] = {0, 6, parts * m, parts * each, 6 * c, motions};
         fits = have_rows(&given, DISTURBANCE, ALL, rows, sizes) && parts < MOST_PARTS;
         Py_BEGIN_ALLOW_THREADS;
         for (Py_ssize_t row = 0; fits && row < rows; row++) {
-            towline_move_on(robot, dt, (int)parts, of[DISTURBANCE] + 6 * row, of[TENSIONS] + m * row, rows * m,
-                            of[ACCELERATIONS] + 6 * c * row, of[MEASURED] + motions * row);
+            const towline_commanded commanded = {
+                of[TENSIONS] + m * row, rows * m, of[ACTUATION] ? of[ACTUATION] + each * row : NULL, rows * each,
+                of[ACCELERATIONS] + 6 * c * row,
+            };
+            towline_move_on(robot, dt, (int)parts, commanded, of[DISTURBANCE] + 6 * row, of[MEASURED] + motions * row);
         }
         Py_END_ALLOW_THREADS;
     }

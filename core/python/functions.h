@@ -60,7 +60,7 @@ FUNCTION(control_step,
 FUNCTION(control_thrusts,
          "(dt, robot, controller, measured, carriers, tensions, cables, platform, memory, turning, actuation)",
          "Write the commands of the actuators of flying carriers; return the most that a thrust lacks [N].")
-FUNCTION(control_move_on, "(dt, robot, disturbance, tensions, accelerations, measured)",
+FUNCTION(control_move_on, "(dt, robot, disturbance, tensions, actuation, accelerations, measured)",
          "Move motions that were measured earlier on, with the tensions (parts, N, m) since.")
 
 /* stages.c */

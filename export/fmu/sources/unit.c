@@ -11,6 +11,7 @@
 
 enum { PLANNED = 0, SOFT = 2, HOLD = 3, MOST_STEPS = 1000000 };
 static const double ROUNDING = 1e-9; /* of a step */
+static const double SPARING = 1e3;   /* in place of TOWLINE_RHO, as in solvers/in_place.py */
 
 static int are_finite(const double *x, ptrdiff_t count) {
     double sum = 0;
@@ -26,15 +27,14 @@ static int are_finite(const double *x, ptrdiff_t count) {
  */
 static int is_given(const towline_unit *unit, const towline_problem *problem, const towline_answer *answer) {
     const int m = problem->m;
-    double missing[6], square = 0, freedom = 0;
+    double missing[6], square = 0;
     for (int k = 0; k < 6; k++) {
-        freedom += unit->known.freedom[k];
         missing[k] = problem->w[k];
         for (int i = 0; i < m; i++) { missing[k] -= problem->A[k * m + i] * answer->tensions[i]; }
         missing[k] /= k < 3 ? 1 : unit->length;
         square += missing[k] * missing[k];
     }
-    if (m >= freedom) { return square <= unit->negligible * unit->negligible; }
+    if (!unit->controller.corrects) { return square <= unit->negligible * unit->negligible; }
     for (int i = 0; i < m; i++) {
         double along = 0;
         for (int k = 0; k < 6; k++) { along += missing[k] / (k < 3 ? 1 : unit->length) * problem->A[k * m + i]; }
@@ -47,6 +47,9 @@ static int is_given(const towline_unit *unit, const towline_problem *problem, co
 static int solve(const towline_unit *unit, const towline_problem *problem, double *tensions) {
     towline_answer answer;
     const towline_status status = towline_solve_always(problem, TOWLINE_RHO, &answer);
+    if (unit->controller.corrects && status != TOWLINE_INVALID && (problem->m >= 6 || status != TOWLINE_OPTIMAL)) {
+        towline_solve_soft(problem, SPARING, &answer);
+    }
     for (int i = 0; i < problem->m; i++) {
         const double planned = problem->t_ref[i], wanted = isfinite(planned) ? planned : unit->cable[i].last;
         tensions[i] =
