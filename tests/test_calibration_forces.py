@@ -16,7 +16,7 @@ from towline.base.errors import InputError
 from towline.estimation.calibration import Measurements, calibrate, outliers, solving, stretch
 from towline.estimation.calibration import representative as module
 from towline.estimation.calibration.autocorrelation import information_of
-from towline.estimation.calibration.balance import FeltTensions
+from towline.estimation.calibration.balance import Balance, FeltTensions
 from towline.estimation.calibration.cross_validation import compare
 from towline.estimation.calibration.fit import fit
 from towline.estimation.calibration.hanging import carrying
@@ -328,9 +328,34 @@ def test_noise_of_accelerations_is_no_larger_where_poses_are_measured_more_often
     assert np.median(motion.sigma) < 0.15
 
 
+@pytest.mark.parametrize("size", [0.0, 1.0])
+def test_the_balance_does_not_depend_on_the_unit_of_force(size):
+    """With twice the mass and gains, all forces of a point are twice as large, and so are errors of accelerations."""
+    draw, t = np.random.default_rng(0), 0.05 * np.arange(40)
+    dof = ("x", "y", "z", "roll", "pitch", "yaw") if size else ("x", "y", "z")
+    robot = robot_file(ANCHORS, size * ATTACHMENTS, np.zeros(3), MASS, [0, 0, 1.4, 0, 0, 0], dof)
+    poses = robot.home + 0.2 * np.sin(np.outer(t, [1, 1.3, 0.8, 0.4 * size, 0.5 * size, 0.6 * size]))
+    poses += draw.normal(0, 2e-3, poses.shape) * robot.dof_mask
+    log = Measurements(np.ones((40, 4)), poses, times=t, tensions=draw.uniform(30, 60, (40, 4)))
+    parameters, balance = Parameters(robot, ("mass", "gains")), Balance(robot, log)
+    forces = np.zeros(parameters.count)
+    forces[parameters.clock + 1], parameters.table(forces)[:, 13] = MASS, 1.0
+    placed = poses[:, :3], Rotation.from_euler("xyz", poses[:, 3:]).as_matrix()
+    less, once, more, twice = (
+        balance.at(parameters, parameters.first + change * forces, placed) for change in (-1e-5, 0, 1e-5, 1)
+    )
+    if not size:
+        np.testing.assert_allclose(twice.residuals, once.residuals, atol=1e-9)
+    parts = np.einsum("ni,nip->p", once.residuals, once.by_parameters * forces)  # of the gradient
+    slope = ((more.residuals**2).sum() - (less.residuals**2).sum()) / 4e-5
+    assert parts.sum() == pytest.approx(slope, abs=1e-5 * np.abs(parts).max())
+
+
 def test_a_log_does_not_tell_mass_from_gains():
-    log, _ = moving(1, seconds=4)
-    result = calibrate("planar-4", log, ("anchors", "offsets", "clock", "mass", "gains"))
+    """Errors of accelerations grow with the mass, and so with the gains: else no fit would end."""
+    log, _ = moving(1, seconds=3)
+    result = calibrate("planar-4", log, ("offsets", "scales", "clock", "mass", "capstan", "gains"))
+    assert result.converged
     assert "mass and gains together: no force is known for certain" in result.not_identifiable
     assert "mass" not in result.identifiable
 

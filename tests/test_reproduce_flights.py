@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
@@ -78,7 +79,8 @@ def drag(robot, air):
 
 def test_the_command_reproduces_the_paper(flown_once, tmp_path, monkeypatch):
     monkeypatch.setattr(style, "svg", lambda figure: "<svg/>")  # each figure is printed into its file,
-    monkeypatch.setattr(style, "DPI", 20)  # of few pixels
+    monkeypatch.setattr(style, "DPI", 20)  # of few pixels, and not laid out
+    monkeypatch.setattr(ConstrainedLayoutEngine, "execute", lambda self, figure: None)
     arguments = ["reproduce", "flying", "--out", str(tmp_path / "out"), "--json"]
     printed = json.loads(CliRunner().invoke(app, arguments, catch_exceptions=False).stdout)
     assert printed["complete"]

@@ -76,7 +76,7 @@ class _Forces(NamedTuple):
     reduced: np.ndarray | None  # residuals in standard deviations
     pull: np.ndarray
     by_arm: np.ndarray
-    sigma: np.ndarray
+    accelerated: np.ndarray
 
     @property
     def most_likely(self) -> np.ndarray:
@@ -231,14 +231,16 @@ class Balance:
         r = (A @ tensions[..., None])[..., 0] + wrench
         inner = A[:, rows] * self._scale[:, None]
         M = (inner * variances[:, None]) @ np.swapaxes(inner, 1, 2)
-        accelerated = np.where(rows < 3, mass, robot.platform.mass) * motion.sigma[:, None]  # its errors [N], (N, k)
+        # Its errors over the mean gain [N], (N, k), as `variances` are: without it, all forces would grow together.
+        heavy = np.where(rows < 3, mass / table[:, 13].mean(), robot.platform.mass)
+        accelerated = heavy * motion.sigma[:, None]
         own = self._log.lasting * (noise * OWN * robot.weight) ** 2 + accelerated**2
         M[:, np.arange(len(rows)), np.arange(len(rows))] += own
         finite = np.isfinite(M).all() and np.isfinite(r).all()
         root = np.linalg.inv(np.linalg.cholesky(M)) if finite else None
         reduced = None if root is None else (root @ (r[:, rows] * self._scale)[..., None])[..., 0]
         felt = record, poses, tensions, by_tensions
-        return _Forces(*felt, A, r, inner, variances, root, reduced, pull, motion.by_arm, motion.sigma)
+        return _Forces(*felt, A, r, inner, variances, root, reduced, pull, motion.by_arm, accelerated)
 
     def masses(
         self, of: Parameters, x: np.ndarray, placed: tuple[np.ndarray, np.ndarray], clock: float
@@ -345,11 +347,17 @@ class Balance:
             return result
 
         reduced = reduce(raw), reduce(by_pose)
-        # Errors of accelerations grow with the mass. Without their part, a smaller mass would make them smaller.
-        of_forces = np.swapaxes(inverse_root[..., rows < 3], 1, 2)
-        growing = mass * np.square(of_log.sigma)[:, None, None] * (of_forces @ residuals[:, rows, None])
-        growing = np.swapaxes(of_forces, 1, 2) @ growing  # (N, k, 1)
+        # Errors of accelerations grow with the mass over the gain. Without their part, a smaller mass would make them
+        # smaller.
+        of_forces = inverse_root[..., rows < 3]
+        growing = (
+            np.square(of_log.accelerated[:, rows < 3, None])
+            / mass
+            * (np.swapaxes(of_forces, 1, 2) @ residuals[:, rows, None])
+        )
+        growing = of_forces @ growing  # (N, k, 1)
         reduced[0][:, rows, of.clock + 1] -= growing[..., 0]
+        reduced[0][:, rows, 13 : of.clock : of.clock // m] += mass / (gain * m) * growing
         if not carries:
             return Balanced(residuals, *reduced, tensions)
         # With the most likely tensions t = s - V A'z, where z = (L L')^-1 r: dt = -V A'(L L')^-1 dr - C dA'z, in which

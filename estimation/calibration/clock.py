@@ -10,9 +10,11 @@ from ..logs.alignment import coarse
 from ..logs.measurements import Measurements, measured_poses, tracked
 from ..logs.pose_track import PoseTrack
 from ..logs.smoothing import after_pauses
+from .balance import needs_balance
 from .fit import held
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
+from .parameters import IN_BALANCE
 
 CLOCK_RANGE = 1.0  # [s] to each side
 SHARE = 0.25  # of the record, to which the range is limited
@@ -31,7 +33,9 @@ def begin_with_clock(model: Model, length: float) -> State:
     """
     count = len(model.measurements)
     few = model.only(np.unique(np.linspace(0, count - 1, min(count, MOST_SAMPLES)).astype(int)))
-    fixed = tuple(group for group in few.parameters.groups if group != "clock")
+    # Where poses are measured, forces tell less of the clock than lengths do.
+    left_out = ("clock",) if needs_balance(model.robot, model.measurements) else ("clock", *IN_BALANCE)
+    fixed = tuple(group for group in few.parameters.groups if group not in left_out)
     without = replace(few, parameters=replace(few.parameters, groups=fixed))
     times = model.measurements.times
     assert times is not None
