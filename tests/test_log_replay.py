@@ -23,7 +23,7 @@ from towline.simulation.windows import Windows
 from .warm import towline as run
 
 NOISE = {"pose": 5e-4, "length": 5e-5, "tension": 0.3}  # [m, rad], [m], [N]
-SECONDS = 5.0
+SECONDS = 4.0
 
 
 def with_cables(robot, **changes):
@@ -42,7 +42,7 @@ WINCH = Winch(inertia=20, friction=15, speed_max=5, force_max=5000)
 COGIRO = with_cables(load("cogiro"), stiffness=200e3, damping=1000.0, winch=WINCH)
 
 
-def swing(centre, size, rates, seconds=SECONDS):
+def swing(centre, size, rates, seconds):
     """A path that begins and ends at rest."""
     times = np.linspace(0, seconds, 101)
     even = np.clip(np.minimum(times, seconds - times), 0, 1)
@@ -53,16 +53,16 @@ def swing(centre, size, rates, seconds=SECONDS):
 
 
 @cache
-def motion(kind):
+def motion(kind, seconds=SECONDS):
     """A robot and its simulation."""
     if kind == "thrusts":
         robot = load("multi-quadrotor-3")
-        pushed = simulate(robot, robot.home, events=["push 6 4 5 at 0.1 for 0.3"], duration=SECONDS, tolerance=9)
+        pushed = simulate(robot, robot.home, events=["push 6 4 5 at 0.1 for 0.3"], duration=seconds, tolerance=9)
         return robot, pushed.trajectory.isel(time=slice(450, None))  # how it comes back
     robot, controller, path = {
-        "lengths": (PLANAR, LengthControl(PLANAR), swing((0, 0, 0.75), (0.2, 0, 0.12), (0.5, 1, 0.8))),
-        "tensions": (load("planar-4"), None, swing((0, 0, 0.75), (0.2, 0, 0.12), (0.5, 1, 0.8))),
-        "drives": (COGIRO, None, swing((0, 0, 1.5), (0.5, 0.4, 0.1), (0.25, 0.3, 0.4))),
+        "lengths": (PLANAR, LengthControl(PLANAR), swing((0, 0, 0.75), (0.2, 0, 0.12), (0.5, 1, 0.8), seconds)),
+        "tensions": (load("planar-4"), None, swing((0, 0, 0.75), (0.2, 0, 0.12), (0.5, 1, 0.8), seconds)),
+        "drives": (COGIRO, None, swing((0, 0, 1.5), (0.5, 0.4, 0.1), (0.25, 0.3, 0.4), seconds)),
     }[kind]
     return robot, simulate(robot, path, controller).trajectory
 
@@ -79,9 +79,9 @@ def driven_by_motors():
     return robot, times, forces, plant.run(plant.start(tensions=held), plant.command(forces), 1e-3)
 
 
-def columns(kind, rows, seed=0):
+def columns(kind, rows, seed=0, seconds=SECONDS):
     """The columns of a recording with noise at some of the samples."""
-    robot, trajectory = motion(kind)
+    robot, trajectory = motion(kind, seconds)
     draw = np.random.default_rng(seed)
 
     def noisy(values, sigma):
@@ -380,10 +380,10 @@ def test_friction_of_winches_that_follow_lengths_shows_in_motor_currents_only(tm
 
 def test_irregular_samples_gaps_and_missing_poses(tmp_path):
     draw = np.random.default_rng(3)
-    count = len(motion("lengths")[1]["time"])
+    count = len(motion("lengths", 5.0)[1]["time"])  # of 5 to 8 windows
     rows = np.sort(draw.choice(count, count // 10, replace=False))
     rows = rows[(rows < 0.4 * count) | (rows > 0.5 * count)]  # and a gap of half a second
-    found = columns("lengths", rows)
+    found = columns("lengths", rows, seconds=5.0)
     for name in ("x [m]", "y [m]", "z [m]", "roll [rad]", "pitch [rad]", "yaw [rad]"):
         found[name][::7] = np.nan
     found["t [s]"] += 1.7e9
