@@ -70,6 +70,28 @@ def test_what_a_solution_exceeds_is_added(monkeypatch, expected):
     assert planned.objective == pytest.approx(expected.objective, rel=1e-3)
 
 
+@pytest.mark.parametrize(("away", "again"), [(0.352, False), (0.2, True)])
+def test_a_solution_that_grazes_what_was_left_out_is_the_next_start(monkeypatch, away, again):
+    """The attachments, 0.06 m beside the line, keep 0.3 m from the middle of the ball. If one is deep, the guess is."""
+    limits = {"keep_out": [{**BALL, "centre": [0.32, away, 1.2]}]}
+    scenario = scenario_of({**TASK, "tube": {"position": 0.5}, "limits": limits})
+    monkeypatch.setattr(search, "NEAR", -1e9)
+    starts, ends, solve = [], [], solver.Solver.solve
+
+    def recorded(self, guess, *others, **options):
+        starts.append(guess.q)
+        ends.append(solve(self, guess, *others, **options))
+        return ends[-1]
+
+    monkeypatch.setattr(solver.Solver, "solve", recorded)
+    nodes = np.linspace(0.0, scenario.duration, 41)
+    first = initial_guess(scenario, nodes)
+    guess = replace(first, q=first.q + 1e-3 * np.sin(np.pi * nodes / nodes[-1])[:, None] ** 4)
+    assert search.Search(scenario, {}, None).solve("program", Mesh(40), guess).success
+    assert len(starts) > 1
+    assert np.allclose(starts[1], starts[0] if again else ends[0].deviation.q)
+
+
 def test_a_jump_over_a_place_between_two_points_is_noticed():
     small = {**BALL, "centre": [0.2, 0.1, 1.2], "radius": 0.05}
     scenario = scenario_of({**TASK, "limits": {"keep_out": [small]}})

@@ -159,8 +159,11 @@ def few_and_inverse(A: np.ndarray, moving: np.ndarray) -> tuple[bool, np.ndarray
             inverse = transposed @ np.linalg.inv(own @ transposed)
             missing = np.eye(dof) - own @ inverse
             inverse += inverse @ missing
-            size, own_size, inverse_size = (np.linalg.norm(each, axis=(1, 2)) for each in (missing, own, inverse))
-            if ((size < INVERTED) & (own_size * inverse_size * INDEPENDENT < 1.0)).all():
+            # The squares of the Frobenius norms, in a sixth of the time of `numpy.linalg.norm`.
+            size, own_size, inverse_size = (np.einsum("nij,nij->n", each, each) for each in (missing, own, inverse))
+            if ((size < INVERTED**2) & (own_size * inverse_size * INDEPENDENT**2 < 1.0)).all():
+                if dof == 6:
+                    return False, inverse
                 whole = np.zeros((n, m, 6))
                 whole[:, :, moving] = inverse
                 return False, whole

@@ -16,7 +16,7 @@ from ..audits.violation import relative_violation
 from ..nlp.grid import Grid
 from ..nlp.guess import initial_guess, usual_guess
 from ..nlp.linear import LinearDistances
-from ..nlp.near import Near, has_places
+from ..nlp.near import Near, has_places, jumps
 from ..nlp.program import Program, build
 from ..nlp.rows import Mesh
 from ..nlp.solver import CIRCLING, MOST_ITERATIONS, SETTLED, TIME_LIMIT, Outcome, Progress, Solver
@@ -166,8 +166,11 @@ class Search:
                 if not outcome.success or self.seconds_left <= 0 or program.suffices(outcome.deviation):
                     break
                 more = program.near.widened(self.scenario, program.shares, outcome.deviation, NEAR)
-                # From the guess again: a solution through a region would come out of it on any side.
-                outcome = self._run(mesh, guess or outcome.deviation, coarser, np.inf, more if added < ROUNDS else None)
+                # From the guess again, if the solution is deep in a region: it would come out of it on any side.
+                grazes = not jumps(self.scenario, outcome.deviation)
+                near = outcome.deviation if grazes or guess is None else guess
+                more = more if added < ROUNDS else None
+                outcome = self._run(mesh, near, coarser and not grazes, np.inf, more)
             how = ended(outcome.message)
             stage.message = f"{how} {'in' if how == 'solved' else 'after'} {counted(outcome.iterations, 'iteration')}"
             if mesh.elastic:
