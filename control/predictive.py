@@ -167,7 +167,8 @@ class Predictive(ComputedTorque):
         self._longest_stage = max(self._stage, min(fastest, within) if self._adapts else fastest) + ROUNDING
         self._usual_longest = min(self._longest_stage, self._slow_loops.longest_inner)
         self.reset()
-        if flies.any() and grows(self, self.robot, rest, float(self._bandwidth.min())):
+        slowest = float(self._bandwidth.min())
+        if flies.any() and grows(self, self.robot, rest, slowest, self._known_age, rotors):
             self.handed_over = self._from_the_start = HandOver(-np.inf, UNSTABLE)
             warn(f"{self.robot.name} is controlled by computed torque: {UNSTABLE}", stacklevel=2)
 

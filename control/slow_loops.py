@@ -44,9 +44,8 @@ class SlowLoops:
     def late_by(self, age: float, is_told: bool, since: float, dt: float) -> float:
         """Return the time between steps that delays attitude loops as much as lags and late states do [s].
 
-        States are predicted over their `age` [s], which may be wrong if it is told, and over the time for which they
-        are held, which begins when one is newer than the last one by some time `since` [s]. The mean is over all states
-        during the first second, because a loop may be unstable with the first ones.
+        States are predicted over their `age` [s], which may be wrong if it is told, and while they are held, until one
+        is newer by `since` [s]. The mean is over all at first, because a loop may be unstable with the first states.
         """
         self._held, self._for = 0.0 if since > 0 else self._held + dt, min(self._for + dt, 1.0)
         late = TURNED * age if is_told else min(max(self._held, 0.0), OLDEST)

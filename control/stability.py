@@ -2,6 +2,7 @@
 
 import hashlib
 import pickle
+from collections import deque
 
 import numpy as np
 
@@ -10,30 +11,37 @@ from ..plant import Plant
 from ..solvers import TensionSolution
 from .computed_torque import ComputedTorque
 from .controller import OTHERWISE, Reference, State
+from .lag import Lag
 
 PERIOD = 2e-3  # [s] between steps
 SLOWEST = 1e-3  # [rad/s]
 LEAST, SLOW, MOST = 400, 4.0, 1500  # steps, time constants of the errors, and steps again
 FAR = 0.3  # of the robot's length: errors that have grown
 MORE = 1.2  # of the velocities in the second third of the steps are in the last: a motion nobody damps has as many
+MORE_STEPS = 100  # at a time, if velocities have grown by less
 PUSH, PUSHED = 0.01, 0.05  # of the robot's weight, and for how long [s]: so little that the loop is linear
 
 _KEPT: dict[tuple[type[ComputedTorque], bytes], bool] = {}
 
 
-def grows(controller: ComputedTorque, robot: Robot, rest: TensionSolution, bandwidth: float) -> bool:
+def grows(
+    controller: ComputedTorque, robot: Robot, rest: TensionSolution, bandwidth: float, age: float, lag: float
+) -> bool:
     """Return whether a small error at rest at home grows in the closed loop, with the rotation of flying carriers.
 
     The loop is closed around `Plant` after a small push in all coordinates, in which unstable modes soon dominate.
     So all states are included: attitudes of carriers, delayed commands, observers. The controller of the robot is reset
-    before and afterwards. `rest` holds the tensions at home; pose errors decay with `bandwidth` [rad/s]. The result is
-    kept for later controllers that are equal to this one.
+    before and afterwards. The result is kept for later controllers that are equal to this one.
+
+    - `rest`: tensions at home.
+    - `bandwidth`: with which errors of the pose decay [rad/s].
+    - `age`, `lag`: age of states without a time, and time constant of actuators, as the controller knows them [s].
 
     False without a test if the load cannot rest there, for example under a rough formation.
     """
     if not rest.residual <= PUSH * robot.force_scale:
         return False
-    given = controller, robot, np.asarray(rest.tensions), bandwidth
+    given = controller, robot, np.asarray(rest.tensions), bandwidth, age, lag
     try:
         state = pickle.dumps(given)
     except (AttributeError, TypeError, pickle.PicklingError):  # as of a class that is defined in a function
@@ -45,7 +53,9 @@ def grows(controller: ComputedTorque, robot: Robot, rest: TensionSolution, bandw
     return _KEPT[key]
 
 
-def _simulated(controller: ComputedTorque, robot: Robot, tensions: np.ndarray, bandwidth: float) -> bool:
+def _simulated(
+    controller: ComputedTorque, robot: Robot, tensions: np.ndarray, bandwidth: float, age: float, lag: float
+) -> bool:
     plant = Plant(robot, drive="tensions" if robot.fixed_lengths is None else "lengths")
     still = np.zeros_like(robot.carrier_home)
     reference = Reference(robot.home, np.zeros(6), np.zeros(6), robot.carrier_home, still, still, tensions)
@@ -55,21 +65,29 @@ def _simulated(controller: ComputedTorque, robot: Robot, tensions: np.ndarray, b
     push *= PUSH * robot.force_scale * scale
     state = plant.start(tensions=tensions)
     steps = int(np.clip(SLOW / max(bandwidth, SLOWEST) / PERIOD, LEAST, MOST))
-    sizes, pulls = np.zeros(steps), tensions
+    sizes, pulls, drives = np.zeros(MOST), tensions, Lag(lag)
+    late = deque([State(robot.home, np.zeros(6), robot.carrier_home, still, tensions)] * round(age / PERIOD))
     controller.reset()
-    for k in range(steps):
+    grown = False
+    for k in range(MOST):
         now = plant.read(state)
-        measured = State(now.pose, now.velocity, now.carrier_pose, now.carrier_velocity, pulls)
+        late.append(State(now.pose, now.velocity, now.carrier_pose, now.carrier_velocity, pulls))
         off, sizes[k] = np.linalg.norm(scale * (now.pose - robot.home)), np.linalg.norm(scale * now.velocity)
-        command = controller.step(PERIOD * k, measured, reference)
+        command = controller.step(PERIOD * k, late.popleft(), reference)
         cables = command.tensions if robot.fixed_lengths is None else robot.fixed_lengths
         wrench = push if PERIOD * k < PUSHED else None
-        row = plant.command(cables, command.actuation, *command[1:4], wrench=wrench)
+        given = None if command.actuation is None else drives.follow(command.actuation, PERIOD)
+        row = plant.command(cables, given, *command[1:4], wrench=wrench)
         run = plant.run(state, row[None], PERIOD)
         state, pulls = run.states[-1], run.tensions.mean(axis=0)
         if not off < FAR * robot.length or command.answered == OTHERWISE:
-            controller.reset()
-            return True
+            grown = True
+            break
+        if k + 1 >= steps:
+            before, last = np.linalg.norm(sizes[: steps // 3 * 3].reshape(3, -1)[1:], axis=1)
+            grown = last > MORE * before
+            if grown or not last > before:
+                break
+            steps += MORE_STEPS
     controller.reset()
-    third = steps // 3
-    return bool(np.linalg.norm(sizes[-third:]) > MORE * np.linalg.norm(sizes[third : 2 * third]))
+    return bool(grown)

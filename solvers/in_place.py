@@ -12,9 +12,8 @@ from .solve import solve
 from .status import INFEASIBLE, INVALID, OPTIMAL, SINGULAR, UNSURE
 
 RHO = 1e8  # weight of the squared wrench error in a soft solution, relative to the squared tensions
-# The same where carriers give what the cables cannot. With more, cables that hardly turn the platform would pull as
-# hard as they can for moments that noise requires. With this, the wrench along a cable is off by 0.1 % of the change of
-# its tension.
+# The same where carriers give what cables cannot. With more, cables that hardly turn the platform pull as hard as they
+# can for moments that noise requires. With this, the wrench along a cable is off by 0.1 % of its tension's change.
 SPARING = 1e3
 
 # With up to so many more cables than equations lanes are as quick for one row and several times as quick for many. With

@@ -6,6 +6,7 @@ import pytest
 from towline import simulate
 from towline.control import ComputedTorque, Predictive, Reference, State
 from towline.control.controllability import is_underactuated
+from towline.control.stability import grows
 from towline.models import Robot, load
 from towline.plant import Plant
 from towline.statics.distribution import tensions
@@ -105,3 +106,21 @@ def test_robots_whose_cables_leave_directions_to_their_carriers_are_underactuate
     for name in ("multi-quadrotor-6", "flycrane", "cogiro", "planar-4", "fast", "ipanema-1", "point-mass-3"):
         assert not is_underactuated(load(name)), name
     assert is_underactuated(radial_team(6))
+
+
+def test_whether_errors_grow_is_found_with_late_states_and_actuators():
+    """States that are predicted over 40 ms must be that late, and h lag is at most 2 for an attitude loop (Routh)."""
+    robot = load("multi-quadrotor-3")
+    rest, controller = tensions(robot, robot.home), ComputedTorque(robot, sensors={"delay": 0.04})
+    assert not grows(controller, robot, rest, 1.5, 0.04, 0.0)
+    assert grows(controller, robot, rest, 1.5, 0.0, 0.0)
+    for lag, is_unstable in ((0.0, False), (0.1, True)):
+        assert grows(ComputedTorque(robot, attitude=60.0), robot, rest, 1.5, 0.0, lag) == is_unstable
+
+
+def test_errors_that_grow_slowly_are_found():
+    """Undamped loops of bandwidth b, with states held for T = 2 ms, grow with b^2 T / 4, at 30 rad/s 13 % in 0.27 s."""
+    robot = load("cogiro")
+    rest = tensions(robot, robot.home)
+    assert grows(ComputedTorque(robot, 30.0, damping=0.0, observer=0.0), robot, rest, 30.0, 0.0, 0.0)
+    assert not grows(ComputedTorque(robot, 30.0, observer=0.0), robot, rest, 30.0, 0.0, 0.0)
