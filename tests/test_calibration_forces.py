@@ -360,6 +360,17 @@ def test_a_log_does_not_tell_mass_from_gains():
     assert "mass" not in result.identifiable
 
 
+def test_the_clock_of_measured_poses_is_sought_without_forces(monkeypatch):
+    """A hundred offsets are tried; the balance of forces would take most of the time, and lengths tell more."""
+    log, _ = moving(1, seconds=4)
+    model = solving.model_of(load("planar-4"), log, ("offsets", "scales", "clock", "mass", "capstan", "gains"), {})
+    usual, evaluated = Balance.at, []
+    monkeypatch.setattr(Balance, "at", lambda *given, **more: evaluated.append(0) or usual(*given, **more))
+    state = solving.begin_with_clock(model, 2.0)
+    assert len(evaluated) <= 1
+    assert state.x[model.parameters.clock] == pytest.approx(0.034, abs=2e-3)
+
+
 def test_tensions_do_not_move_anchors_out_of_the_plane_of_a_planar_robot():
     log, _ = moving(1, seconds=4)
     noise = np.random.default_rng(3).normal(0, 1e-3, log.poses.shape) * [0, 1, 0, 1, 0, 1]  # of y, roll and yaw
