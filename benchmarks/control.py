@@ -22,26 +22,13 @@ from ..control import ComputedTorque, Controller, OpenLoop, Predictive
 from ..models import Robot, load
 from ..simulation import simulate
 from ..solvers import Horizon
-from .control_contenders import (
-    ACADOS,
-    CONTENDERS,
-    FIELDS,
-    REFERENCE,
-    TOWLINE,
-    Array,
-    Contender,
-    Program,
-    condense,
-    exact,
-    fill,
-)
+from .control_contenders import CONTENDERS, FIELDS, REFERENCE, TOWLINE, Array, Contender, Program, condense, exact, fill
 from .harness import alternating, machine, ratio, table
 
 STANDARD = "computed torque"
 Progress = Callable[[str, int, int], None]
 Makers = dict[str, Callable[[Robot], Controller]]  # of controllers by name
 TIMED = ("casadi", "daqp", "osqp", "numpy")
-EVERYONE = (*CONTENDERS, *ACADOS)  # acados, where it is installed
 FAILED = 1e-3  # controls this far off are a failure, in units of their range
 BLOCK = 25  # programs of a turn
 
@@ -219,7 +206,7 @@ def run(steps: int = 500, seeds: int = 3, tasks: Sequence[Task] = TASKS, progres
         accepted, refused = _accepted(task, robot)
         show(0)
         if "predictive" in accepted:
-            rows += measure(task.name, record(task, robot, steps), EVERYONE)
+            rows += measure(task.name, record(task, robot, steps), CONTENDERS)
         show(1)
         whole += _steps(task, robot, steps, accepted)
         whole += [Step(task.name, name, detail=why) for name, why in refused.items()]

@@ -258,16 +258,6 @@ def _hpipm(first: Program) -> Solver:
     return Solver(arrange, solve)
 
 
-CONTENDERS = (
-    Contender(TOWLINE, "1e-6", partial(_towline, warm=True)),
-    Contender("towline Horizon, cold", "1e-6", partial(_towline, warm=False)),
-    Contender(REFERENCE, "1e-6, its own", partial(_daqp, alone=False)),
-    Contender("daqp.solve, warm, condensing not counted", "1e-6, its own", partial(_daqp, alone=True)),
-    Contender("osqp, sparse, warm", "1e-6", _osqp),
-    Contender("hpipm through CasADi", "speed_abs, its own", _hpipm),
-)
-
-
 class _Plan(Structure):
     """The solver of `ocp_qp_solver_plan_t`; 0 is partial condensing with HPIPM."""
 
@@ -339,4 +329,12 @@ def _acados(first: Program) -> Solver:
     return Solver(arrange, solve)
 
 
-ACADOS = (Contender("acados, partial condensing and HPIPM", f"{TOLERANCE:g}", _acados),) if folder() else ()
+CONTENDERS = (
+    Contender(TOWLINE, "1e-6", partial(_towline, warm=True)),
+    Contender("towline Horizon, cold", "1e-6", partial(_towline, warm=False)),
+    Contender(REFERENCE, "1e-6, its own", partial(_daqp, alone=False)),
+    Contender("daqp.solve, warm, condensing not counted", "1e-6, its own", partial(_daqp, alone=True)),
+    Contender("osqp, sparse, warm", "1e-6", _osqp),
+    Contender("hpipm through CasADi", "speed_abs, its own", _hpipm),
+    *([Contender("acados, partial condensing and HPIPM", f"{TOLERANCE:g}", _acados)] if folder() else []),
+)

@@ -8,28 +8,13 @@ import typer
 from ..base.errors import InputError
 from ..base.inputs import check_ending, shown
 from ..base.processors import one_thread_each
-from .options import (
-    FPS,
-    SPEED,
-    FormatOption,
-    FpsOption,
-    JsonOption,
-    ReportOption,
-    RobotArgument,
-    SpeedOption,
-    check_animation,
-    left_out,
-    parameters,
-    print_result,
-    schema_option,
-    usual_file,
-)
+from . import options
 from .outputs import Outputs, check_outputs
 from .stopping import add_to_message
 from .watching import checkpoint_of, counting, long_run, resumable, watching
 
 
-@parameters(f"""
+@options.parameters(f"""
     TASK: A task file (YAML).
     --out: NetCDF (.nc) or MCAP (.mcap) file to write; default: ROBOT-TASK.nc in this folder, from the `name` keys of
         both files, and ROBOT-TASK-infeasible.nc or ROBOT-TASK-not-found.nc if the plan is not feasible. An existing
@@ -50,15 +35,15 @@ from .watching import checkpoint_of, counting, long_run, resumable, watching
     --keep FOLDER: With --vary: folder in which to save every plan (NetCDF).
 """)
 def plan(
-    robot: RobotArgument,
+    robot: options.RobotArgument,
     task: Path,
     out: Path | None = None,
     figures: Path | None = None,
-    form: FormatOption = "png",
-    report: ReportOption = None,
+    form: options.FormatOption = "png",
+    report: options.ReportOption = None,
     animate: Path | None = None,
-    speed: SpeedOption = SPEED,
-    fps: FpsOption = FPS,
+    speed: options.SpeedOption = options.SPEED,
+    fps: options.FpsOption = options.FPS,
     robust: float | None = None,
     vary: list[str] | None = None,
     workers: int = 1,
@@ -66,14 +51,14 @@ def plan(
     checkpoint: Path | None = None,
     resume: Path | None = None,
     keep: Path | None = None,
-    as_json: JsonOption = False,
-    schema: Annotated[bool, schema_option("task files", "ocp", "Task")] = False,
+    as_json: options.JsonOption = False,
+    schema: Annotated[bool, options.schema_option("task files", "ocp", "Task")] = False,
 ) -> None:
     """Plan a motion that keeps every tension inside its limits, or report why none exists.
 
     With --vary it plans once per combination of the given values, and writes a table.
     """
-    check_animation(animate, speed, fps)
+    options.check_animation(animate, speed, fps)
     outputs = Outputs(as_json, figures, form, report, animate, speed, fps)
     if vary:
         for name, value in (("--report", report), ("--animate", animate), ("--robust", robust)):
@@ -88,18 +73,18 @@ def plan(
         return
     many = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint}
     when = "without --vary: it is an option for many plans"
-    left_out({**many, "--resume": resume, "--keep": keep}, when, got=False)
+    options.left_out({**many, "--resume": resume, "--keep": keep}, when, got=False)
     from ..models import load
     from ..ocp import plan as plan_motion
     from ..ocp import read_task
 
     loaded, read = load(robot), read_task(task)
-    target = check_ending("--out", out or usual_file(loaded.name, f"{read.name}.nc"), ".nc", ".mcap")
+    target = check_ending("--out", out or options.usual_file(loaded.name, f"{read.name}.nc"), ".nc", ".mcap")
     check_outputs({"--out": target, "--report": report, "--animate": animate, "--figures": outputs.picture("path")})
     with watching(f"planning {read.name}", quiet=as_json) as watch:
         planned = plan_motion(loaded, read, watch, robust=robust)
         if out is None and not planned.feasible:  # it replaces no plan that is
-            target = usual_file(loaded.name, read.name, f"{planned.status}.nc")
+            target = options.usual_file(loaded.name, read.name, f"{planned.status}.nc")
         written = {"file": planned.save(target)}
         if not planned.feasible:
             watch.now("searching for feasible tasks near this one")
@@ -124,7 +109,7 @@ def sweep(robot: str, task: Path, vary: list[str], where: dict[str, Any], out: P
 
     loaded, read, picture = load(robot), read_task(task), outputs.picture("sweep")
     varied = read_option(vary)
-    target = out if out is not None else usual_file(loaded.name, read.name, "sweep.nc")
+    target = out if out is not None else options.usual_file(loaded.name, read.name, "sweep.nc")
     if target.suffix == ".csv":
         raise InputError(f"--out must be a NetCDF file (.nc), got {target}")
     check_ending("--out", target, ".nc")
@@ -142,6 +127,6 @@ def sweep(robot: str, task: Path, vary: list[str], where: dict[str, Any], out: P
 
         files.append(style.save(result.figure(), picture))
     data, folder = {**result.to_dict(), **written}, where["keep"]
-    print_result(outputs.as_json, data, result.report, [*files, *([folder] if folder else [])])
+    options.print_result(outputs.as_json, data, result.report, [*files, *([folder] if folder else [])])
     if not result.feasible:
         raise typer.Exit(1)

@@ -9,20 +9,9 @@ import typer
 
 from ..base.errors import InputError
 from ..base.inputs import check_ending
+from . import options
 from .calibrate import by_name
 from .log import FieldsOption, FixOption
-from .options import (
-    CarrierPoseOption,
-    FormatOption,
-    JsonOption,
-    RobotArgument,
-    left_out,
-    numbers,
-    parameters,
-    print_json,
-    print_table,
-    print_written,
-)
 from .outputs import Outputs, check_outputs
 
 if TYPE_CHECKING:
@@ -33,7 +22,7 @@ SIX = "x y z roll pitch yaw"
 FEWEST_FIT = 0.95  # of the samples of a log
 
 
-@parameters(f"""
+@options.parameters(f"""
     --lengths 'one number for each cable': Measured lengths of the cables [m].
     --log LOG: Log of readings of the winches, instead of --lengths: CSV, NetCDF, MCAP or a ROS bag. The encoders of the
         robot file convert them to lengths. May be repeated, for several logs of one motion.
@@ -44,18 +33,18 @@ FEWEST_FIT = 0.95  # of the samples of a log
         name: lengths=0.001,rotation=0.01.
 """)
 def pose(
-    robot: RobotArgument,
+    robot: options.RobotArgument,
     lengths: str | None = None,
     log: list[Path] | None = None,
     fields: FieldsOption = None,
     fix: FixOption = False,
     out: Path | None = None,
     figures: Path | None = None,
-    form: FormatOption = "png",
+    form: options.FormatOption = "png",
     start: str | None = None,
-    carrier_pose: CarrierPoseOption = None,
+    carrier_pose: options.CarrierPoseOption = None,
     sigma: str = "0.001",
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Estimate the pose of the platform from its cable lengths, and list other poses that fit them.
 
@@ -70,23 +59,25 @@ def pose(
     if (lengths is None) == (log is None):
         raise InputError("one of --lengths and --log must be given, got " + ("none" if log is None else "both"))
     if log is None:
-        left_out({"--out": out, "--figures": figures, "--fields": fields, "--fix": fix}, "with --lengths")
+        options.left_out({"--out": out, "--figures": figures, "--fields": fields, "--fix": fix}, "with --lengths")
     else:
-        left_out({"--start": start, "--carrier-pose": carrier_pose}, "with --log")
+        options.left_out({"--start": start, "--carrier-pose": carrier_pose}, "with --log")
         target, outputs = out or Path(f"{log[0].stem}-poses.csv"), Outputs(as_json, figures, form)
         _of_log(loaded, log, fields, sigma, target, outputs, fix)
         return
     assert lengths is not None
-    measured = numbers("--lengths", lengths, loaded.m)
-    near = None if start is None else numbers("--start", start, 6)
-    carriers = None if carrier_pose is None else numbers("--carrier-pose", carrier_pose, 6, rows=len(loaded.carriers))
-    deviations = numbers("--sigma", sigma, loaded.m if len(sigma.replace(",", " ").split()) > 1 else 1)
+    measured = options.numbers("--lengths", lengths, loaded.m)
+    near = None if start is None else options.numbers("--start", start, 6)
+    carriers = (
+        None if carrier_pose is None else options.numbers("--carrier-pose", carrier_pose, 6, rows=len(loaded.carriers))
+    )
+    deviations = options.numbers("--sigma", sigma, loaded.m if len(sigma.replace(",", " ").split()) > 1 else 1)
     deviations = deviations[0] if len(deviations) == 1 else deviations
     estimate = pose_from_lengths(loaded, measured, near, carriers, deviations)
     others = [other for other in branches(loaded, measured, carriers, deviations) if not _same(loaded, other, estimate)]
     if as_json:
         poses = [other.pose.tolist() for other in others]
-        print_json({"robot": loaded.name, **estimate.to_dict(), "others": poses})
+        options.print_json({"robot": loaded.name, **estimate.to_dict(), "others": poses})
     else:
         _show(loaded, estimate, others)
     if not estimate.consistent:
@@ -111,7 +102,7 @@ def _of_log(
     check_outputs({"--out": out, "--figures": picture}, {f"the log {log}": log for log in logs})
     stated = by_name("--sigma", sigma, Sigma._fields) if "=" in sigma else {}
     sigma = str(stated.get("lengths", SIGMA)) if stated else sigma
-    deviations = numbers("--sigma", sigma, robot.m if len(sigma.replace(",", " ").split()) > 1 else 1)
+    deviations = options.numbers("--sigma", sigma, robot.m if len(sigma.replace(",", " ").split()) > 1 else 1)
     read = read_log(logs, stated or None, None, robot, fields)
     if fix:
         read, correction = corrected_log(robot, read)
@@ -123,7 +114,7 @@ def _of_log(
         files.append(style.save(drawn, picture))
     data: dict[str, Any] = {"robot": robot.name, **found.to_dict(), "notes": read.notes, "files": files}
     if outputs.as_json:
-        print_json(data)
+        options.print_json(data)
     else:
         sigmas = np.sqrt(np.diagonal(found.estimate.covariance, axis1=-2, axis2=-1))
         size = quantity(1e3 * data["residual"], "mm", 3)
@@ -137,7 +128,7 @@ def _of_log(
             typer.echo("  a motion of the platform changes none of the readings: poses are undetermined along it")
         for line in (_included(found.estimate), *read.notes, *found.lines()):
             typer.echo(f"  {line}")
-        print_written(files)
+        options.print_written(files)
     if data["consistent"] < FEWEST_FIT or data["doubt"]:
         raise typer.Exit(1)
 
@@ -175,7 +166,7 @@ def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> N
         unit, deviation = "m" if i < 3 else "rad", 1e3 * estimate.sigmas[i]
         spread = quantity(deviation, f"m{unit}", 3) if np.isfinite(deviation) else "undetermined"
         rows.append((name, f"{values[i]} {unit}", spread if robot.dof_mask[i] else "fixed"))
-    print_table(["", "estimate", "sigma"], rows, "lrr")
+    options.print_table(["", "estimate", "sigma"], rows, "lrr")
     if robot.dof_mask[3:].any():
         typer.echo("The sigmas of the angles refer to small rotations about the axes of {G}.")
     typer.echo(_included(estimate))

@@ -16,22 +16,8 @@ import typer
 from ..base.errors import InputError
 from ..base.inputs import check_ending, one_of, printable, shown
 from ..base.processors import one_thread_each
+from . import options
 from .log import FieldsOption, FixOption
-from .options import (
-    FPS,
-    SPEED,
-    FormatOption,
-    FpsOption,
-    JsonOption,
-    ReportOption,
-    RobotArgument,
-    SpeedOption,
-    check_animation,
-    left_out,
-    numbers,
-    parameters,
-    print_result,
-)
 from .outputs import Outputs, check_outputs
 from .stopping import add_to_message
 from .watching import checkpoint_of, counting, long_run, resumable, watching
@@ -45,7 +31,7 @@ WINDOW = 0.5  # [s]
 CONTROLLERS: tuple[str, ...] = ("computed-torque", "predictive", "lengths", "open-loop", "fault-tolerant")
 
 
-@parameters(f"""
+@options.parameters(f"""
     PLAN|LOG: A plan of this robot: a file that `towline plan` or `towline simulate` wrote (NetCDF). Or a recording to
         replay: CSV, NetCDF, MCAP or a ROS bag.
     --controller: The controller: {", ".join(CONTROLLERS)}; Python accepts controllers of your own.
@@ -79,7 +65,7 @@ CONTROLLERS: tuple[str, ...] = ("computed-torque", "predictive", "lengths", "ope
         if they reduce the residuals of the other half.
 """)
 def simulate(
-    robot: RobotArgument,
+    robot: options.RobotArgument,
     plan: Path,
     controller: str = CONTROLLERS[0],
     wind: str | None = None,
@@ -97,11 +83,11 @@ def simulate(
     resume: Path | None = None,
     out: Path | None = None,
     figures: Path | None = None,
-    form: FormatOption = "png",
+    form: options.FormatOption = "png",
     animate: Path | None = None,
-    speed: SpeedOption = SPEED,
-    fps: FpsOption = FPS,
-    report: ReportOption = None,
+    speed: options.SpeedOption = options.SPEED,
+    fps: options.FpsOption = options.FPS,
+    report: options.ReportOption = None,
     replay: bool = False,
     poses: Path | None = None,
     fields: FieldsOption = None,
@@ -110,7 +96,7 @@ def simulate(
     delay: float = 0.0,
     window: float = WINDOW,
     fit: Path | None = None,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Simulate a plan in closed loop, with wind, sensor noise and events, or replay a recording.
 
@@ -121,10 +107,10 @@ def simulate(
     1 if a run or a recording does not pass.
     """
     one_of("--controller", controller, CONTROLLERS)
-    check_animation(animate, speed, fps)
+    options.check_animation(animate, speed, fps)
     if runs is None:
         many = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint, "--resume": resume}
-        left_out(many, "without --runs: it is an option for many runs", got=False)
+        options.left_out(many, "without --runs: it is an option for many runs", got=False)
     of_log = {"--replay": replay, "--poses": poses, "--fields": fields, "--fix": fix}
     of_log |= {"--drive": drive, "--fit": fit, "--delay": delay, "--window": window != WINDOW}
     from ..estimation.logs.opening import is_recording
@@ -133,14 +119,14 @@ def simulate(
         of_plan = {"--controller": controller != CONTROLLERS[0] and controller, "--wind": wind, "--gusts": gusts}
         of_plan |= {"--noise": noise, "--mismatch": mismatch, "--event": event, "--duration": duration}
         of_plan |= {"--seed": seed, "--runs": runs, "--animate": animate}
-        left_out(of_plan, "with a recording")
-        options = {"poses": poses, "fields": fields, "fix": fix, "drive": drive, "delay": delay, "window": window}
-        replay_log(robot, plan, options | {"tolerance": tolerance}, out, fit, Outputs(as_json, figures, form, report))
+        options.left_out(of_plan, "with a recording")
+        given = {"poses": poses, "fields": fields, "fix": fix, "drive": drive, "delay": delay, "window": window}
+        replay_log(robot, plan, given | {"tolerance": tolerance}, out, fit, Outputs(as_json, figures, form, report))
         return
-    left_out(of_log, "without a recording")
+    options.left_out(of_log, "without a recording")
     stored = checkpoint_of(checkpoint, resume)
     if runs is not None:
-        left_out({"--animate": animate, "--report": report}, "with --runs")
+        options.left_out({"--animate": animate, "--report": report}, "with --runs")
     # Before libraries load: the processes of --workers share the processors.
     with one_thread_each(), _named(event or []):
         from ..control import ComputedTorque, FaultTolerant, LengthControl, OpenLoop, Predictive
@@ -162,7 +148,7 @@ def simulate(
         kind = dict(zip(CONTROLLERS, kinds, strict=True))[controller]
         known: dict[str, Any] = {} if kind is OpenLoop else {"sensors": sensors}
         pilot = kind(loaded, **known)
-        air = None if wind is None else numbers("--wind", wind, 3)
+        air = None if wind is None else options.numbers("--wind", wind, 3)
         differs = None if mismatch is None else read_yaml(mismatch, Mismatch)
         conditions = Conditions(
             air, gusts, sensors, events=event or (), duration=duration, tolerance=tolerance, mismatch=differs
@@ -214,12 +200,12 @@ def _often(run: Callable[..., xr.Dataset], plan: str, where: Execution, target: 
         drawings = {"errors": figure.errors(flights), "envelopes": figure.envelopes(flights)}
         pictures = style.save_all(lambda: drawings, outputs.figures, outputs.form)
     data = {**summary(flights), "file": file, "figures": pictures}
-    print_result(outputs.as_json, data, lambda: report(flights).text(), (file, *pictures))
+    options.print_result(outputs.as_json, data, lambda: report(flights).text(), (file, *pictures))
     return bool(flights["passed"].all())
 
 
 def replay_log(
-    robot: Any, log: Path, options: dict[str, Any], out: Path | None, fit: Path | None, outputs: Outputs
+    robot: Any, log: Path, given: dict[str, Any], out: Path | None, fit: Path | None, outputs: Outputs
 ) -> None:
     """Replay, save, draw and print; the exit code is 1 if the replay fails, or the fitted robot is not written."""
     from ..models import load
@@ -229,9 +215,9 @@ def replay_log(
     if fit is not None:
         check_ending("--fit", fit, ".yaml", ".yml")
     files = {"--out": target, "--fit": fit, "--report": outputs.report, "--figures": outputs.picture("replay")}
-    check_outputs(files, {"the log": log, "--poses": options["poses"]})
+    check_outputs(files, {"the log": log, "--poses": given["poses"]})
     try:
-        result = replay(loaded, log, fit=fit is not None, **options)
+        result = replay(loaded, log, fit=fit is not None, **given)
     except InputError as error:
         option = "--" * str(error).startswith(("fix ", "drive ", "delay ", "window ", "tolerance "))
         raise InputError(f"{option}{error}") from None

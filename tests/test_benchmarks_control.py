@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from towline.base.errors import InputError
-from towline.benchmarks.control import EVERYONE, TASKS, Task, measure, record, run
+from towline.benchmarks.control import CONTENDERS, TASKS, Task, measure, record, run
 from towline.benchmarks.control_contenders import REFERENCE, TOWLINE, Contender, condense, horizon_of
 from towline.cli.bench import app
 from towline.control import Predictive
@@ -67,14 +67,14 @@ def test_a_robot_at_rest_costs_few_iterations():
 
 def test_who_is_right_is_measured_as_right(at_limits):
     """Count those that are off or give nothing; most reach the optimum, some at a coarse tolerance."""
-    prepare = EVERYONE[0].prepare
+    prepare = CONTENDERS[0].prepare
 
     def wrong(first):
         solver = prepare(first)
         return solver._replace(solve=lambda given: solver.solve(given) + 1.0)
 
     silent = Contender("silent", "", lambda first: prepare(first)._replace(solve=lambda given: None))
-    who = [*EVERYONE, Contender("wrong", "", wrong), silent]
+    who = [*CONTENDERS, Contender("wrong", "", wrong), silent]
     rows = {row.contender: row for row in measure("task", at_limits[150:180], who)}
     for name, row in rows.items():
         assert row.programs == 30
@@ -96,7 +96,7 @@ def test_the_command_prints_what_the_design_says(monkeypatch):
     data = json.loads(CliRunner().invoke(app, ["control", "--json"]).stdout)
     for row in data["rows"]:
         assert {"task", "contender", "median_us", "p99_us", "ratio", "max_error", "failures"} <= set(row)
-    assert {row["contender"] for row in data["rows"]} == {each.name for each in EVERYONE}
+    assert {row["contender"] for row in data["rows"]} == {each.name for each in CONTENDERS}
     steps = {(row["task"], row["controller"]): row for row in data["steps"]}
     assert steps[FREE.name, "predictive"]["ratio"] > 1.0
     assert steps[FREE.name, "computed torque"]["ratio"] == 1.0

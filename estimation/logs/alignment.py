@@ -34,6 +34,16 @@ class ClockJumpError(InputError):
     """A clock that was set while it recorded."""
 
 
+class Records(NamedTuple):
+    """Readings of N samples, and K poses with the lengths along them by the robot's file, each on a clock."""
+
+    times: np.ndarray  # (N,) [s]
+    readings: np.ndarray  # (N, m), in any unit
+    pose_times: np.ndarray  # (K,) [s]
+    lengths: np.ndarray  # (K, m) [m]
+    poses: np.ndarray  # (K, d), what the effect of wrong anchors is linear in
+
+
 class Clock(NamedTuple):
     """Time of the poses = offset + rate * time of the lengths [s], the correlation of speeds, up to 1, and sigmas."""
 
@@ -49,60 +59,44 @@ class Clock(NamedTuple):
         return f"the clock of the poses is {abs(self.offset):.6f} s {ahead}{drift}"
 
 
-def align(
-    times: np.ndarray, readings: np.ndarray, pose_times: np.ndarray, lengths: np.ndarray, poses: np.ndarray
-) -> Clock:
-    """Return the clock of poses relative to that of readings.
-
-    - `times`, `readings`: (N,) [s], (N, m), in any unit.
-    - `pose_times`, `lengths`, `poses`: (K,) [s], (K, m) [m] by the robot's file, (K, d): what the effect of wrong
-      anchors is linear in.
-
-    Raises `InputError` if the speeds have too little in common.
-    """
-    clock, left = _aligned(times, readings, pose_times, lengths, poses)
+def align(records: Records) -> Clock:
+    """Return the clock of poses relative to that of readings; raise InputError if speeds have too little in common."""
+    clock, left = _aligned(records)
     if left > MOST_LEFT:
         share = quantity(100 * left, "%", 2)
         raise InputError(f"lengths and poses must be of one motion, got poses that leave {share} of it unexplained")
     return clock
 
 
-def check_jumps(
-    times: np.ndarray, readings: np.ndarray, pose_times: np.ndarray, lengths: np.ndarray, poses: np.ndarray
-) -> None:
-    """Raise InputError if a gap in one of the clocks must be a jump, because the motion went on without it.
-
-    Arguments as for `align`.
-    """
+def check_jumps(records: Records) -> None:
+    """Raise InputError if a gap in one of the clocks must be a jump, because the motion went on without it."""
     left = np.inf
-    for which, own in (("lengths", times), ("poses", pose_times)):
+    for which, field in (("lengths", "times"), ("poses", "pose_times")):
+        own = getattr(records, field)
         steps = np.diff(own)
         usual = float(np.median(steps))
         wide = np.flatnonzero(steps > JUMP * usual)
         for k in wide[np.argsort(-steps[wide])[:MOST_JUMPS]]:
             if left == np.inf:
-                left = _aligned(times, readings, pose_times, lengths, poses)[1]
+                left = _aligned(records)[1]
             jump = float(steps[k]) - usual
             closed = np.where(np.arange(len(own)) > k, own - jump, own)
-            both = (closed, pose_times) if own is times else (times, closed)
-            if _aligned(both[0], readings, both[1], lengths, poses)[1] < NO_JUMP * left:
+            if _aligned(records._replace(**{field: closed}))[1] < NO_JUMP * left:
                 raise ClockJumpError(
                     f"times of the {which} must be of one clock, got one that seems to jump by "
                     f"{quantity(jump, 's', digits=3)} at {own[k]:.3f} s; cut the log there"
                 )
 
 
-def _aligned(
-    times: np.ndarray, readings: np.ndarray, pose_times: np.ndarray, lengths: np.ndarray, poses: np.ndarray
-) -> tuple[Clock, float]:
-    """Return the clock, and the part of the lengths' changes that the poses leave unexplained; arguments as `align`."""
+def _aligned(records: Records) -> tuple[Clock, float]:
+    """Return the clock, and the part of the lengths' changes that the poses leave unexplained."""
+    times, readings, pose_times, lengths, poses = records
     found = [coarse(times, readings, pose_times, lengths)]
     if found[0][2] < SURE:  # poses in another frame still show how fast the platform is
         offset, _, likeness = coarse(times, readings, pose_times, poses[:, :3], _whole_speed)
         found.append((offset, np.arange(lengths.shape[1]), likeness))
     fitted = [
-        (*_fine(times, readings[:, order], pose_times, lengths, poses, offset), likeness)
-        for offset, order, likeness in found
+        (*_fine(records._replace(readings=readings[:, order]), offset), likeness) for offset, order, likeness in found
     ]
     clock, left, likeness = min(fitted, key=lambda one: one[1])
     return clock._replace(likeness=likeness), left
@@ -171,36 +165,34 @@ def _gain(likeness: Any, shared: Any) -> Any:
     return -shared * np.log1p(-(np.minimum(likeness, 0.99999) ** 2))
 
 
+def _rates(times: np.ndarray, values: np.ndarray, apart: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return equal times (n + 1,), and the changes between them of values (N, m), (m, n)."""
+    grid = times[0] + apart * np.arange(max(int(np.ptp(times) / apart), 2))
+    return grid, np.array([np.diff(np.interp(grid, times, column)) for column in values.T])
+
+
 def _whole_speed(times: np.ndarray, values: np.ndarray, apart: float) -> np.ndarray:
     """Return the size of all speeds together, as `_speeds`, (1, n)."""
-    grid = times[0] + apart * np.arange(max(int(np.ptp(times) / apart), 2))
-    rates = np.array([np.diff(np.interp(grid, times, column)) for column in values.T])
+    grid, rates = _rates(times, values, apart)
     whole = np.cumsum(np.sqrt((rates**2).sum(axis=0)))
     return _speeds(grid[1:], whole[:, None], apart)
 
 
 def _speeds(times: np.ndarray, values: np.ndarray, apart: float) -> np.ndarray:
     """Return the speeds (m, n) of values (N, m) at equal times, each of mean 0 and of one size."""
-    grid = times[0] + apart * np.arange(max(int(np.ptp(times) / apart), 2))
-    rates = np.array([np.diff(np.interp(grid, times, column)) for column in values.T])
+    rates = _rates(times, values, apart)[1]
     rates -= rates.mean(axis=1, keepdims=True)
     limit = 10 * np.median(np.abs(rates), axis=1, keepdims=True) + 3 * rates.std(axis=1, keepdims=True)
     rates = np.clip(rates, -limit, limit)  # readings that are wrong
     return rates / np.maximum(np.sqrt((rates**2).mean(axis=1, keepdims=True)), 1e-300)
 
 
-def _fine(
-    times: np.ndarray,
-    readings: np.ndarray,
-    pose_times: np.ndarray,
-    lengths: np.ndarray,
-    poses: np.ndarray,
-    offset: float,
-) -> tuple[Clock, float]:
-    """Fit offset and rate by the Gauss-Newton method, and return what is left of the lengths' changes, up to 1.
+def _fine(records: Records, offset: float) -> tuple[Clock, float]:
+    """Fit offset and rate by the Gauss-Newton method, and return the unexplained part of the lengths' changes, up to 1.
 
     Scales, offsets and linear effects are eliminated.
     """
+    times, readings, pose_times, lengths, poses = records
     low, high = pose_times[0] - offset, pose_times[-1] - offset
     rows = np.flatnonzero((times >= low) & (times <= high))
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_FITTED)).astype(int))]

@@ -10,7 +10,7 @@ from ...base.errors import InputError
 from ...models import points
 from ...models.dynamics import Dynamics
 from ...models.robot import Robot
-from .alignment import Clock, ClockJumpError, align, check_jumps
+from .alignment import Clock, ClockJumpError, Records, align, check_jumps
 from .cable_directions import vectors
 from .carrier_poses import angles_at, carriers_at, from_ned, ned_frame, platform_from_ned
 from .encoders import locked
@@ -101,10 +101,10 @@ def aligned(
     effects = np.hstack(effects)
     effects = effects[:, np.ptp(effects, axis=0) > 1e-6]
     along = np.asarray(Dynamics(robot).cable_lengths(poses, carriers))
-    signals = lengths.times[complete], lengths.values[complete], pose.times[rows], along, effects
+    records = Records(lengths.times[complete], lengths.values[complete], pose.times[rows], along, effects)
     if of_poses:
-        check_jumps(*signals)
-    return align(*signals)
+        check_jumps(records)
+    return align(records)
 
 
 def realigned(
