@@ -11,7 +11,7 @@ from ..core import control_carriers, control_coordinates
 from ..models.dynamics import dynamics_of
 from ..models.record import record_of
 from ..models.robot import Robot
-from .command_delay import Pending
+from .late_states import Pending
 from .records import MOST_TETHERS, TETHER
 
 LEAST_REACH = 0.02  # of the mean length of cables of fixed length: with less, errors of the load are not corrected

@@ -17,10 +17,9 @@ from ..base.errors import InputError, TowlineError
 from ..base.inputs import number, shown
 from ..base.writing import whole_file
 from . import style
-from .hull import faces
 from .perspective import Perspective
 from .robot import BODY, POST, box_edges, drawn_ends
-from .scene import Scene
+from .scene import Scene, faces
 from .tension_colours import mark, place, scale, shades
 
 SIZE = (7.0, 5.2)  # [inches]

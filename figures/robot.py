@@ -14,9 +14,8 @@ import numpy as np
 
 from ..base.text import quantity
 from . import style
-from .hull import faces, outline
 from .perspective import Perspective
-from .scene import Scene
+from .scene import Scene, faces, outline
 from .tension_colours import mark, place, scale, shades
 
 PARTS = 8  # of a cable, so that it is before one body and behind another

@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import style
-from .hull import outline
-from .scene import Scene
+from .scene import Scene, outline
 
 SWEPT = 15  # instants at which rotors are drawn
 NEAR = 0.3  # of the robot's extent

@@ -16,8 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .evaluation import Evaluation
-from .goal import Goal
-from .variables import Variables, by_cable
+from .variables import Goal, Variables, by_cable
 
 MOVES = 2000
 _NEGATIVE = 0.05  # weight of the mean of negative margins

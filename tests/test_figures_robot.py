@@ -10,7 +10,7 @@ from matplotlib.text import Text
 from towline import Robot, available, load
 from towline.figures import robot as figure
 from towline.figures import style
-from towline.figures.hull import faces, outline
+from towline.figures.scene import faces, outline
 from towline.figures.views import ABOVE, FRONT, SIDE, views_of
 from towline.statics.scene import scene_at
 

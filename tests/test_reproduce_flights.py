@@ -17,7 +17,7 @@ from towline.figures import style
 from towline.models import Dynamics, load
 from towline.studies.accounts.claim import Verdict
 from towline.studies.flying import flights, plans, shaken, wind
-from towline.studies.flying.wound import FLIGHT, PERIOD
+from towline.studies.flying.shaken import FLIGHT, PERIOD
 from towline.studies.papers import FLYING
 from towline.studies.towing import flights as towed
 

@@ -11,7 +11,7 @@ import pytest
 
 from towline import InputError, load, plan, simulate
 from towline.control import ComputedTorque, OpenLoop, Predictive, references
-from towline.control.command_delay import Pending
+from towline.control.late_states import Pending
 from towline.control.trajectory import read_trajectory
 from towline.models import Dynamics
 from towline.simulation import Cut, Event, Follow, Push, Wall

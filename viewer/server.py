@@ -19,8 +19,7 @@ from ..base.writing import whole_file
 from ..figures.perspective import ALONG
 from .access import guarded
 from .frames import Frames, with_script
-from .live_page import live_page
-from .page import aside, camera
+from .page import aside, camera, live_page
 from .panel import Live
 from .replay import Replay
 from .stage import Stage

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from ..base.text import quantity
 from ..figures import style
-from ..figures.hull import faces
 from ..figures.perspective import ALONG
 from ..figures.robot import box_edges, drawn_ends
+from ..figures.scene import faces
 from ..figures.tension_colours import place, rgb, shades
 from ..models.body import surface
 from . import labels

@@ -3,7 +3,7 @@
 from towline import load
 from towline.models.library import contents
 from towline.viewer import read
-from towline.viewer.live_page import live_page
+from towline.viewer.page import live_page
 
 from .markup import escaped, table
 

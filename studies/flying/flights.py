@@ -1,9 +1,9 @@
 """Paper F's three motions, flown: the library's robot with its elastic cables, in the wind of figure 5.
 
 The plans are made by `plans`, without air. Each is simulated three times: by the lengths of Eq. 5 without control
-(`wound`), by computed torque under a quadrotor that stays on its plan, and by computed torque under one that gives way
-to the wind by up to 0.5 m. The last two also fly the circle of radius 0.15 m under a hovering quadrotor. Where there is
-no wind the air rests, so a platform that flies straight at 10 m/s has drag without any.
+(`wind_up`), by computed torque under a quadrotor that stays on its plan, and by computed torque under one that gives
+way to the wind by up to 0.5 m. The last two also fly the circle of radius 0.15 m under a hovering quadrotor. Where
+there is no wind the air rests, so a platform that flies straight at 10 m/s has drag without any.
 
 The quadrotor of the paper hovers or flies straight, so these flights reproduce nothing of VI.A and VI.B: they are
 repairs. Its motion is prescribed, level whatever its acceleration, and no cable pulls it off.
@@ -25,8 +25,8 @@ from ..accounts.claim import Chapter, Claim
 from .claims import claim
 from .plans import BELOW, FEASIBLE, NOT_READ, RATE, SECONDS, TIMES, Name, planned, solved
 from .repair import ON_CIRCLE
+from .shaken import FLIGHT, Wound, wind_up
 from .wind import NOISE, PEAK
-from .wound import FLIGHT, Wound, wind_up
 
 MOTIONS: tuple[Name, ...] = get_args(Name)
 PLACES = {"circle": "VI.B, figure 8", "helix": "VI.A, figure 6", "pitching": "figures 12 and 13"}

@@ -1,8 +1,8 @@
 """Paper F's section V and the elastic plant: the same vibration, the tensions of a simulation and the procedure's.
 
-The platform moves on the circle of radius 0.15 m under a hovering quadrotor, by commanded lengths (`wound`), once still
-and once shaken by a small force along each axis, at 5, 6 and 7 Hz as in `vibration`. What the force adds to the pose is
-the vibration that the procedure receives; what it adds to the tensions is what the procedure should give.
+The platform moves on the circle of radius 0.15 m under a hovering quadrotor, by commanded lengths (`wind_up`), once
+still and once shaken by a small force along each axis, at 5, 6 and 7 Hz as in `vibration`. What the force adds to the
+pose is the vibration that the procedure receives; what it adds to the tensions is what the procedure should give.
 
 Its dT has two parts. Both take the displacement of the platform from its steady motion, and the damping divides it by
 the time step, which is no part of the vibration. If the displacement is instead the change in one time step, the
@@ -19,15 +19,18 @@ from ...models import Dynamics, Robot, load
 from ...models.air import trapezoid
 from ...models.cables.driving_force import DrivingForce, driving_force
 from ...models.part import COORDINATES
+from ...ocp.tasks.paths import Motion
 from ...plant import Plant
+from ...plant.reading import Reading
 from ..accounts.claim import Chapter, Claim
 from .cable import constants
 from .claims import claim
-from .plans import FEASIBLE, circle
+from .plans import FEASIBLE, circle, solved
 from .vibration import ELEMENTS, HERTZ, PHASES, RATIO
 from .wind import NOISE, PEAK
-from .wound import FLIGHT, PERIOD, unstrained, wind_up
 
+PERIOD = 1e-3  # of the commanded lengths [s]
+FLIGHT = PERIOD * np.arange(10_001)  # [s]
 FORCE = 0.1  # amplitude along each axis [N]: it takes no tension below zero
 SHAKEN = FLIGHT[:3001]  # instants of the vibration [s]
 BEGUN = slice(1000, -200)  # its rows without its begin and its end
@@ -39,6 +42,55 @@ RELEASED = np.diag([1e-4] * 6)  # velocities of the platform in the beginning [m
 LASTS = 2.0  # of a free vibration [s]
 TENTH, SLOW = 0.1, 10.0  # what is left of a vibration, and how many of its periods that takes if it decays slowly
 HOLDS = (10, 100)  # periods between two samples of the wind's noise
+
+
+class Wound(NamedTuple):
+    """A run, or a batch of them: what the plant's states are, and the tensions (..., n, m) [N]."""
+
+    states: Reading
+    tensions: np.ndarray
+
+
+def wind_up(
+    robot: Robot,
+    body: Motion,
+    carriers: Motion | None = None,
+    wind: np.ndarray | None = None,
+    wrench: np.ndarray | None = None,
+    lengths: np.ndarray | None = None,
+) -> Wound:
+    """Command lengths every `PERIOD` and let the plant move from the first pose and velocity of a motion on.
+
+    The cables are elastic. Motions of platform and carriers are in {G}, (n, 6) and (n, c, 6) each; default: carriers at
+    home. The wind is the velocity of the air in {G} [m/s], (..., n - 1, 3); default: no air. The wrench [N, N m] acts
+    on the platform, (..., n - 1, 6); default: none. Lengths are unstrained [m], (n, m); default: the distances from
+    anchor to attachment, the paper's Eq. 5.
+    """
+    plant, dynamics = Plant(robot), Dynamics(robot)
+    count = len(body.pose)
+    still = np.zeros((count, len(robot.carriers), 6))
+    bases = Motion(still + robot.carrier_home, still, still) if carriers is None else carriers
+    wound = dynamics.cable_lengths(body.pose, bases.pose) if lengths is None else lengths
+    start = plant.start(
+        body.pose[0], body.velocity[0], carrier_pose=bases.pose[0], carrier_velocity=bases.velocity[0], lengths=wound[0]
+    )
+    commands = plant.command(
+        wound[1:],
+        carrier_pose=bases.pose[:-1],
+        carrier_velocity=bases.velocity[:-1],
+        carrier_acceleration=bases.acceleration[:-1],
+        wind=wind,
+        wrench=wrench,
+    )
+    run = plant.run(start, commands, PERIOD)
+    return Wound(plant.read(run.states), run.tensions)
+
+
+def unstrained(robot: Robot, body: Motion) -> np.ndarray:
+    """Return the lengths that have the steady tensions of a motion under a resting carrier, (n, m) [m]."""
+    dynamics = Dynamics(robot)
+    T = solved(dynamics.wrench_matrix(body.pose), dynamics.required_wrench(*body))
+    return dynamics.cable_lengths(body.pose) / (1 + T / constants(robot)[0])
 
 
 class Shaken(NamedTuple):
