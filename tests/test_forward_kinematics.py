@@ -12,7 +12,7 @@ from scipy.stats import chi2, ncx2
 
 from towline import InputError, Robot, available, core, load, solve_batch
 from towline.estimation.pose.estimate import gradient, moved
-from towline.estimation.pose.problem import problem_of
+from towline.estimation.pose.search import problem_of
 from towline.estimation.pose.wrong_lengths import wrong_cables
 from towline.models import branches, points, pose_from_lengths
 from towline.models.dynamics import dynamics_of

@@ -7,8 +7,8 @@ import pytest
 
 from towline import InputError
 from towline.estimation.logs import read_log
-from towline.estimation.logs.frozen import spikes
 from towline.estimation.logs.names import role
+from towline.estimation.logs.streams import spikes
 
 from . import user_recordings as user
 

@@ -16,8 +16,7 @@ from ...models.dynamics import dynamics_of
 from ...models.robot import Robot
 from ..pose.estimate import largest_cost
 from ..pose.from_lengths import pose_from_lengths
-from ..pose.problem import problem_of
-from ..pose.search import level_platform
+from ..pose.search import level_platform, problem_of
 from .fit import Fit, fit
 from .hanging import slack
 from .model import Model, State

@@ -26,7 +26,6 @@ from .carrier_poses import (
 )
 from .clocks import Seen, clock_of_poses, set_clocks_of_carriers
 from .encoders import lengths_of, unrolled
-from .frozen import seen
 from .load_cells import notes as unreadable_notes
 from .mapping import Fields, LogMap, carrier_fields, fields_of, free_axes, listed, read_map
 from .measurements import Measurements
@@ -34,7 +33,7 @@ from .names import LETTERED, corner
 from .opening import recordings
 from .pose_track import PoseTrack, unit_quaternions
 from .recording import COUNTED, Field, Recording, Samples
-from .streams import Reader, at_times, complete_samples, interpolated, like_time
+from .streams import Reader, at_times, complete_samples, interpolated, like_time, seen
 from .thrust_gains import notes_of_tilts
 
 Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]

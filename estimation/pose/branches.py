@@ -15,9 +15,8 @@ from ...models.robot import Robot
 from ...statics.equilibria import equilibria
 from .estimate import PoseEstimate, largest_cost
 from .from_lengths import SIGMA, checked_sigma, one_pose
-from .problem import Problem, problem_of
 from .residual_tests import squares_of
-from .search import APART, level_platform
+from .search import APART, Problem, level_platform, problem_of
 from .taut import taut
 
 

@@ -18,9 +18,8 @@ from ...models.robot import Robot
 from ...statics.equilibria import Equilibrium, equilibria
 from ...statics.rest_near import rests_near, sensitivity
 from .estimate import PoseEstimate, moved, unbounded
-from .problem import Problem, problem_of
 from .residual_tests import length_errors
-from .search import estimates
+from .search import Problem, estimates, problem_of
 
 SIGMA = 1e-3  # [m], of a measured length: what a winch with an encoder achieves
 MOST = 1e100  # [m]: larger ones, and inverses of smaller ones, cannot be squared beside lengths
