@@ -12,10 +12,9 @@ from towline.base.text import counted
 from towline.estimation.calibration import Measurements, calibrate, cross_validation, representative, starts
 from towline.estimation.calibration import model as model_module
 from towline.estimation.calibration.autocorrelation import information_of
-from towline.estimation.calibration.curvature import curvature
 from towline.estimation.calibration.fit import fit
 from towline.estimation.calibration.geometry import length_of
-from towline.estimation.calibration.normal_equations import NormalEquations, metric
+from towline.estimation.calibration.normal_equations import NormalEquations, curvature, metric
 from towline.estimation.calibration.parameters import OF_CABLE
 from towline.estimation.calibration.solving import model_of
 from towline.estimation.logs.pose_track import PoseTrack

@@ -20,11 +20,9 @@ from .attitudes import misread_attitudes
 from .differences import FEWEST
 from .explanations import BY_CHANCE, explanations, is_noise
 from .geometry import length_of
-from .input_errors import Mistake, better_by, corrected_to
 from .interpretations import FACTORS
-from .other_frames import displaced, in_other_frames
+from .other_frames import Mistake, Unexplained, aligned, better_by, corrected_to, displaced, in_other_frames, part_of
 from .parameters import Parameters
-from .unexplained import Unexplained, aligned, part_of
 
 DECISIVELY = 1.5  # times smaller differences
 MOST_SAMPLES = 400
