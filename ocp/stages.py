@@ -142,10 +142,8 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
     else:
         with search.stage("timing") as stage:
             fast, stage.message = search.timing.fastest
-        law = None if fast is None else fast.law
-        if fast is not None and law is not None and fast.feasible and fast.duration <= span.max:
-            if own and fast.duration < span.min:
-                return None, own
+        law, least = None if fast is None else fast.law, span.min if own else 0.0
+        if fast is not None and law is not None and fast.feasible and least <= fast.duration <= span.max:
             chosen = scenario.along(law.path.resting_until(span.min), max(fast.duration, span.min))
             known = audit_of_law(fast, chosen) if chosen.path is law.path else None
             audit = search.audit_motion(chosen, None, "audit with the fastest time law", known)

@@ -285,8 +285,7 @@ def _carriers(plan: PlanData) -> list[Fact]:
         facts.append(("", _against(acceleration, limits.get("carrier_acceleration"), "m/s^2", times)))
         for limit in plan.scenario.limits:
             if limit.name == "carrier_tilt" and limit.labels == (carrier.name,):
-                (values,) = plan.audit.limiting(limits=[limit])
-                tilt, most = np.degrees(values[:, 0]), float(np.degrees(limit.high))
+                tilt, most = np.degrees(plan.audit.limiting(limits=[limit])[0][:, 0]), float(np.degrees(limit.high))
                 facts.append(("", _against(tilt, most, "degrees of tilt", times)))
     return facts
 
