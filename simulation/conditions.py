@@ -15,10 +15,11 @@ from ..control.noise import Noise
 from ..models import air
 from ..models.parsing import validate
 from ..models.robot import Robot
-from ..plant.plant import DRIVES
 from .events.event import Event
 from .events.faults import Cut
 from .mismatch import Mismatch
+
+COMMANDED = ("lengths", "forces", "tensions")  # drives of a `Plant` for which controllers have commands
 
 Wind = Callable[[np.ndarray, int], np.ndarray]  # the wind at times (K,) [s] for a seed, (K, 3) [m/s]
 
@@ -44,8 +45,8 @@ class Conditions(Displayed):
         period: Period of the controller [s].
         substeps: Runge-Kutta steps of the plant per period (default: chosen by the stiffness and damping of the cables,
             see `plant.steps.steps_in`).
-        drive: Type of command of the plant, see `Plant`; default: "forces" if all cables have winches, "lengths" if all
-            are elastic or of fixed length, otherwise "tensions".
+        drive: Type of command of the plant: "lengths", "forces" or "tensions", see `Plant`; default: "forces" if all
+            cables have winches, "lengths" if all are elastic or of fixed length, otherwise "tensions".
         tolerance: Largest position error allowed for a pass [m]; default: 0.05 m, or 5 % of the mean cable length at
             home if that is less.
         mismatch: How the simulated robot and its drives differ from the file, a `Mismatch` or a mapping (default: not
@@ -78,7 +79,7 @@ class Conditions(Displayed):
         if self.substeps is not None:
             whole_number("substeps", self.substeps, 1, 1000)
         if self.drive is not None:
-            one_of("drive", self.drive, DRIVES)
+            one_of("drive", self.drive, COMMANDED)
         for name, kind in (("noise", Noise), ("mismatch", Mismatch)):
             if not isinstance(given := getattr(self, name), kind):
                 object.__setattr__(self, name, validate({} if given is None else given, kind, name))

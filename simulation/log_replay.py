@@ -109,9 +109,15 @@ class Replay(Drawn, Reported, Displayed):
     @property
     def notes(self) -> list[str]:
         """Return remarks, one line each, for example that a delay may be due to commands held between samples."""
-        windows = self.windows
+        windows, noise = self.windows, self.matching.noise
         step = float(np.median(np.diff(windows.recorded.times)))
         late = [one.value for one in self.found if one.name in self.named and one.name == "delay"]
+        few = len(windows.starts) <= BLOCK and any(rms > 2 * noise[name] for name, rms in self.rms().items())
+        if few and not self.named and not windows.recorded.doubt:
+            return [
+                *windows.notes,
+                f"the windows are too few to name a cause: try some shorter than {windows.window:g} s",
+            ]
         if windows.measured_command or not late or not 0.25 * step < late[0] < 0.75 * step:
             return windows.notes
         held = (

@@ -216,10 +216,11 @@ class Windows:
         self._attitudes = {index: self._attitude(carriers[:, :, index, 3:]) for index in self.flown}
         values, of_cables = self._command, tuple(zip(self._command.T, self._lags, strict=True))
         self._signal: Any = lambda at: np.stack([np.interp(at - lag, of.times, one) for one, lag in of_cables], axis=-1)
-        if self.drive == "lengths" and self.measured_command and len(of.times) >= FEWEST:
+        if self.drive == "lengths" and len(of.times) >= FEWEST:  # stiff cables feel where lines cut corners
             from scipy.interpolate import CubicSpline
 
-            self._signal = CubicSpline(of.times, smooth(of.times, values, self._neighbours))
+            even = smooth(of.times, values, self._neighbours) if self.measured_command else values
+            self._signal = CubicSpline(of.times, even)
         dynamics = dynamics_of(self.robot)
         lengths = np.asarray(dynamics.cable_lengths(self._platform[0], carriers))
         self._cable_speed = np.gradient(lengths, self._dt, axis=1)

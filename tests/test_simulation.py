@@ -190,6 +190,12 @@ def test_a_stuck_winch_holds_the_unstrained_length_of_its_cable():
     assert np.abs(flight.record.tensions - flight.record.commanded)[1410:, 1].max() > 1.0
 
 
+def test_tensions_that_a_controller_commands_are_no_rates_of_lengths():
+    """Tensions of 60 N were taken for 60 m/s, and the robot fell."""
+    with pytest.raises(InputError, match="drive must be one of lengths, forces, tensions, got 'rates'"):
+        simulate("planar-4", load("planar-4").home, duration=0.1, drive="rates")
+
+
 @pytest.mark.parametrize(
     ("robot", "drive", "message"),
     [

@@ -309,6 +309,10 @@ def test_a_file_of_events_names_no_other(robot, tmp_path):
             {"kind": "wall", "at": 0, "point": [0, 0, 0], "normal": [0, 0, 0], "stiffness": 1},
             "normal must have a length, got zeros",
         ),
+        (
+            {"kind": "wall", "at": 0, "point": [0, 0, 0], "normal": [0, 0, 1e-200], "stiffness": 1},
+            "normal must have a length, got (0.0, 0.0, 1e-200)",
+        ),
         ({"kind": "brush", "at": 0}, "events[0]: kind must be one of carry, cut, follow, lose, miss, push,"),
         ({"at": 0}, "events[0]: kind must be one of"),
         ("follow none.nc at 0", "no such file"),

@@ -146,8 +146,8 @@ class Wall(Lasting):
 
     @model_validator(mode="after")
     def _has_normal(self) -> Self:
-        if not any(self.normal):
-            raise ValueError("normal must have a length, got zeros")
+        if not np.linalg.norm(self.normal) > 0:  # of squares that do not underflow
+            raise ValueError(f"normal must have a length, got {shown(self.normal) if any(self.normal) else 'zeros'}")
         return self
 
     @override
