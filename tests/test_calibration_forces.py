@@ -117,6 +117,23 @@ def test_four_cables_calibrate_without_a_camera():
     assert chi2.ppf(1e-3, 14) < sum(ratios) < chi2.ppf(1 - 1e-3, 14)
 
 
+def test_a_sensor_mounted_askew_is_no_wrong_com():
+    """By 3 degrees. Without its mount, the CoM and the offsets would be many standard deviations off."""
+    poses, readings, angles, tensions, offsets = rests(0)
+    mount = Rotation.from_rotvec([0.03, -0.04, 0.02])
+    angles = (Rotation.from_euler("xyz", angles) * mount).as_euler("xyz")
+    sigma = {"lengths": 1e-3, "rotation": AHRS, "tensions": 0.02}
+    result = calibrate(drawn(), Measurements(readings, orientations=angles, tensions=tensions, sigma=sigma))
+    assert set(result.free) == {"offsets", "com", "body"}
+    names = [one.name for one in result.parameters]
+    at = [names.index(f"{name}.{axis}") for name in ("body.turn", "com") for axis in "xyz"]
+    at = [names.index(f"cables[{i}].offset") for i in range(4)] + at
+    error = np.array([result.parameters[k].value for k in at]) - [*offsets, *mount.inv().as_rotvec(), *COM]
+    assert error @ np.linalg.solve(result.covariance[np.ix_(at, at)], error) < chi2.ppf(1 - 1e-3, len(at))
+    assert np.sqrt(((result.poses - poses)[:, :3] ** 2).sum(axis=1).mean()) < 0.02
+    assert max(result.parameters[k].sigma for k in at[4:]) < 0.015  # [m, rad]
+
+
 def test_residuals_show_how_wrong_the_anchors_of_a_file_are():
     """Of anchors 30 mm off, six times as far as files usually are, offsets and CoM are as far off as stated."""
     ratios = []

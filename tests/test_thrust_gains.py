@@ -49,6 +49,14 @@ def test_gains_drift_and_tilt_of_thrusts(gains, end, tilt, said, recorded, tmp_p
     assert found.robot.platform.mass == pytest.approx(0.4, rel=0.01)
 
 
+def test_drag_makes_no_load_lighter(tmp_path):
+    """Of up to 0.16 N across the plane of the cables, whose balance the drag alone disturbs."""
+    robot, recorded = load(user.team_robot(tmp_path)), user.team(12, drag=0.15)
+    log = user.flight(tmp_path / "flight.csv", recorded, user.directions_of(recorded[2]), NAMES)
+    found = calibrate(robot, read_log(log, robot=robot).measurements, free=("offsets", "mass"))
+    assert found.robot.platform.mass == pytest.approx(0.4, rel=0.01)
+
+
 def test_noise_of_thrusts_makes_no_load_lighter(recorded, tmp_path):
     """Of 2 %: 0.2 N of 2 N in the cables. Weights that follow it are larger where the tensions are too small."""
     t, x, drones = recorded

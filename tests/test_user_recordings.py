@@ -136,6 +136,22 @@ def test_a_planar_robot_with_a_drum_scale_and_positions_alone(tmp_path):
     assert "no pose fits the lengths of any sample" in wrong
 
 
+def test_positions_alone_show_scales_of_drums_and_wrong_readings(tmp_path):
+    """Unknown angles leave the size of the robot known, and so do a few missing positions."""
+    robot, _ = user.planar(tmp_path, 12)
+    read = read_measurements(tmp_path / "planar.csv", robot=robot)
+    lengths, poses = read.lengths.copy(), read.poses.copy()
+    lengths[100, 1] += 0.05
+    poses[30:33] = np.nan
+    result = calibrate(robot, read.changed(lengths=lengths, poses=poses))
+    assert [(one.cable, one.sample) for one in result.outliers] == [(1, 100)]
+    assert "scales" in result.free
+    scales = [one for one in result.parameters if one.name.endswith(".scale")]
+    assert all(abs(one.value - 1.02) < 4 * one.sigma for one in scales)
+    assert max(one.sigma for one in scales) < 2e-3
+    assert "anchors are" not in result.report()  # farther apart or closer together than in the file
+
+
 def test_positions_alone_have_input_errors_too(tmp_path):
     robot, _ = user.planar(tmp_path)
     text = (tmp_path / "planar.csv").read_text()

@@ -175,10 +175,11 @@ def planar(folder, seconds=24):
     return robot_file(folder / "planar.yaml", anchors, attachments, home, extra="  dof: [x, z, pitch]\n"), true
 
 
-def team(seconds=20):
+def team(seconds=20, drag=0.0):
     """Two quadrotors with a point mass at 100 Hz: times, position of the load, and of each drone and its cable.
 
-    These are the drone's position, rotation, thrust, and the unit vector from load to drone.
+    These are the drone's position, rotation, thrust, and the unit vector from load to drone. `drag` [N s/m] is that of
+    the load.
     """
     dt, masses, lengths, load = 1e-3, (0.6, 0.65), (0.82, 0.79), 0.4
     t = np.arange(-0.1, seconds + 0.1, dt)
@@ -191,7 +192,7 @@ def team(seconds=20):
     apart = np.column_stack([1.2 + 0.2 * np.sin(0.5 * t), 0.3 * np.sin(0.8 * t), 0.1 * np.sin(0.6 * t)])
     drones = []
     for mass, length, sign in zip(masses, lengths, (1, -1), strict=True):
-        pull = load * (second(x) + GRAVITY) / 2 + sign * apart
+        pull = (load * (second(x) + GRAVITY) + drag * np.gradient(x, dt, axis=0)) / 2 + sign * apart
         q = pull / np.linalg.norm(pull, axis=1, keepdims=True)
         p = x + length * q
         force = mass * (second(p) + GRAVITY) + pull

@@ -231,11 +231,12 @@ class Balance:
         r = (A @ tensions[..., None])[..., 0] + wrench
         inner = A[:, rows] * self._scale[:, None]
         M = (inner * variances[:, None]) @ np.swapaxes(inner, 1, 2)
+        # Forces that the model lacks accelerate the platform, so they are errors of its acceleration, too.
+        sigma = np.hypot(motion.sigma, np.sqrt(self._log.lasting) * noise * OWN * np.linalg.norm(robot.gravity))
         # Its errors over the mean gain [N], (N, k), as `variances` are: without it, all forces would grow together.
         heavy = np.where(rows < 3, mass / table[:, 13].mean(), robot.platform.mass)
-        accelerated = heavy * motion.sigma[:, None]
-        own = self._log.lasting * (noise * OWN * robot.weight) ** 2 + accelerated**2
-        M[:, np.arange(len(rows)), np.arange(len(rows))] += own
+        accelerated = heavy * sigma[:, None]
+        M[:, np.arange(len(rows)), np.arange(len(rows))] += accelerated**2
         finite = np.isfinite(M).all() and np.isfinite(r).all()
         root = np.linalg.inv(np.linalg.cholesky(M)) if finite else None
         reduced = None if root is None else (root @ (r[:, rows] * self._scale)[..., None])[..., 0]

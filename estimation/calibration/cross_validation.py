@@ -265,7 +265,7 @@ def _predict(
     length = length_of(whole.robot)
     begin = model.begin()
     begin.x[parameters.clock] = solved.fit.state.x[parameters.clock] if "clock" in free else 0.0
-    if np.isinf(model.pose_sigmas).any():
+    if model.has_unknown_poses:
         found = fit_from(model, begin, length, enough=ENOUGH)[0]
     else:
         found = fit(model, begin, length, MOST_STEPS, enough=ENOUGH)

@@ -45,7 +45,7 @@ def undetermined(solved: Solved) -> dict[str, float]:
         return {}
     values, vectors = np.linalg.eigh(solved.noise.covariance[block])
     away = ((solved.fit.state.x - of.first) * scale)[of.varies][lengths] @ vectors
-    if values[-1] <= limit or (solved.model.size_is_open and (away[values > limit] ** 2).sum() <= limit):
+    if values[-1] <= limit or (solved.model.has_unknown_poses and (away[values > limit] ** 2).sum() <= limit):
         return {}
     return dict.fromkeys([end for end in ENDS.values() if end in of.groups], LOOSE_SHARE * length)
 

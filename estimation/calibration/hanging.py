@@ -35,7 +35,7 @@ def slack(model: Model, state: State) -> np.ndarray:
     """
     none = np.zeros(model.weights.shape, dtype=bool)
     # Whether it is at rest follows from accelerations, which take memory for a long log.
-    if model.forces is None or not np.isinf(model.pose_sigmas).any() or not model.forces.at_rest:
+    if model.forces is None or not model.has_unknown_poses or not model.forces.at_rest:
         return none
     tensions = carrying(model, state)
     return none if tensions is None else hardly_pull(tensions.tensions).T

@@ -92,7 +92,12 @@ class Model(Displayed):
 
     @cached_property
     def size_is_open(self) -> bool:
-        """Return whether unknown poses leave the size open, so that residuals of readings are those by their scale."""
+        """Return whether most positions are unknown, so that residuals of readings are those by their scale."""
+        return bool(np.isinf(self.pose_sigmas[:, :3]).any(axis=1).mean() > 0.5)
+
+    @property
+    def has_unknown_poses(self) -> bool:
+        """Return whether some poses were not measured completely."""
         return bool(np.isinf(self.pose_sigmas).any())
 
     @cached_property
@@ -175,7 +180,7 @@ class Model(Displayed):
             return False
         if self._open:  # errors of accelerations, far larger at the ends of a log, must be unknowns then
             return bool(self.parameters.groups)
-        wanted = "elasticity" in self.parameters.groups or (self.size_is_open and self.balanced is not None)
+        wanted = "elasticity" in self.parameters.groups or (self.has_unknown_poses and self.balanced is not None)
         return wanted and self._forces.at_rest
 
     @property

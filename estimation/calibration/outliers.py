@@ -263,8 +263,9 @@ def _copies(model: Model, state: State, samples: np.ndarray, weights: np.ndarray
     of_samples = {name: getattr(given, name) for name in ARRAYS} | {"lengths": lengths, "times": None}
     if given.poses is not None:
         position, rotation = model.poses(model.begin()._replace(x=state.x))
-        at = np.hstack([position, points.angles(rotation)])
-        of_samples["poses"] = np.where(np.isfinite(model.pose_sigmas[:, :6]), at, np.nan)
+        halves = np.hstack([position, points.angles(rotation)]).reshape(-1, 2, 3)  # positions, orientations
+        seen = np.isfinite(model.pose_sigmas[:, :6]).reshape(-1, 2, 3).all(axis=2, keepdims=True)
+        of_samples["poses"] = np.where(seen, halves, np.nan).reshape(-1, 6)
     copies = given.changed(**{name: None if of is None else of[samples] for name, of in of_samples.items()})
     felt = model.felt and model.felt.only(samples)
     return Model(parameters, copies, {}, weights, poses, felt=felt)
@@ -298,7 +299,7 @@ def find_slips(model: Model, state: State, length: float) -> list[Slip]:
     unit = model.measurements.sigma.lengths
     # A wrong reading disturbs a cable's parameters, and so all its residuals: the clearest may be no step.
     slips: list[Slip] = []
-    most = MOST_CANDIDATES if np.isinf(model.pose_sigmas).any() else 1
+    most = MOST_CANDIDATES if model.has_unknown_poses else 1
     for statistic, cable, sample, size, sigma in sorted(candidates, reverse=True):
         if statistic <= max(limit**2, NEARLY * max(candidates)[0] * bool(slips)) or len(slips) == most:
             break

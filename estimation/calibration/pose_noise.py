@@ -30,7 +30,7 @@ PAIRS = 2
 def seeming_information(model: Model, state: State, equations: NormalEquations, scale: np.ndarray) -> np.ndarray:
     """Return B, (p, p) [1/m^2], of the `equations` at a state; zero if all poses were measured."""
     B, root = np.zeros_like(equations.S), equations.inverse_root
-    if root is None or not B.size or not np.isinf(model.pose_sigmas).any():
+    if root is None or not B.size or not model.has_unknown_poses:
         return B
     for point in _sigma_points(model, *root.shape[:2]):
         dq = np.einsum("nji,nj->ni", root, point) * model.poses_vary

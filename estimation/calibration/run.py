@@ -14,6 +14,7 @@ from .geometry import length_of
 from .parameters import GROUPS, IN_BALANCE, check_free, check_prior
 from .plausibility import mistake
 from .representative import representative
+from .sensor_mount import is_askew, with_mount
 from .solving import solve
 from .stretch import is_elastic, uses_slack, with_elasticity, with_stretch
 from .zeros import has_zeros, with_zeros
@@ -92,6 +93,9 @@ def calibrate(
         solved = solve(chosen, given, groups, first, outliers)
     if first != priors:
         priors = errors_of_file(solved, priors)
+        solved = solve(chosen, given, groups, priors, outliers)
+    if is_askew(solved):
+        groups, priors = with_mount(groups, priors)
         solved = solve(chosen, given, groups, priors, outliers)
     if has_zeros(solved):
         groups, priors = with_zeros(given, groups, priors)

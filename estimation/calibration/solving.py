@@ -17,12 +17,12 @@ from .carrier_clocks import CarrierClocks, has_carrier_clocks, with_carrier_cloc
 from .carrier_motion import CarrierMotion
 from .clock import begin_with_clock
 from .considered import Considered, considered
-from .fit import Fit, fit
+from .fit import Fit, fit, held
 from .geometry import length_of
 from .hanging import carrying, without_slack
 from .left_out import left_out
 from .model import Model, State
-from .normal_equations import metric
+from .normal_equations import NormalEquations, metric
 from .observability import Observability
 from .outliers import LEAST_THRESHOLD, SHORTEST, Outlier, Slip, find_outliers, find_slips, find_unbalanced, robust
 from .parameters import OF_ROBOT, Parameters
@@ -128,7 +128,7 @@ def solve(
 
     `near` is a fit of the same log with fewer parameters, from which the fit begins if all poses are known.
     """
-    begin = None if near is None or near.model.size_is_open else near
+    begin = None if near is None or near.model.has_unknown_poses else near
     model = model_of(robot, measurements, groups, prior, near=begin)
     length, taut = length_of(robot), model.weights
     if begin is not None:
@@ -300,6 +300,22 @@ def covariance_of(solved: Solved) -> np.ndarray:
     covariance = solved.noise.covariance / scale[:, None] / scale
     covariance += considered_of(solved).covariance
     return (covariance + covariance.T) / 2
+
+
+def one_step(
+    solved: Solved, group: str, groups: tuple[str, ...], prior: dict[str, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a further group of parameters after one step of the fit (k,), and its covariance for noise as stated.
+
+    `groups` and `prior` contain the group.
+    """
+    of = solved.model
+    model = replace(of, parameters=replace(of.parameters, groups=groups), prior=prior)
+    scale, columns = metric(model), np.flatnonzero(Parameters(model.robot, (group,)).varies)
+    equations = NormalEquations.at(model, solved.fit.state, scale)
+    covariance = np.linalg.inv(held(equations.S, length_of(model.robot)))
+    own, unit = np.isin(np.flatnonzero(model.parameters.varies), columns), scale[columns]
+    return (-covariance @ equations.b)[own] / unit, covariance[np.ix_(own, own)] / unit / unit[:, None]
 
 
 def considered_of(solved: Solved) -> Considered:

@@ -49,7 +49,7 @@ def fit_from(
     def cleaned(of: Model, state: State, softest: float = np.inf) -> tuple[State, np.ndarray]:
         return robust(of, state, length, softest) if outliers else (state, of.weights)
 
-    if not np.isinf(model.pose_sigmas).any():
+    if not model.has_unknown_poses:
         result = fit(model, state, length, enough=enough)
         state, weights = cleaned(model, result.state)
         return result._replace(state=state), replace(model, weights=weights)

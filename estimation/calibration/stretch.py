@@ -36,7 +36,7 @@ def with_elasticity(solved: Solved) -> tuple[tuple[str, ...], dict[str, float]]:
     of, groups, prior = solved.model, solved.model.parameters.groups, dict(solved.model.prior)
     turns = turning(of.robot, of.measurements)
     # Unknown poses would adapt to errors of the attachments, too.
-    if turns is not None and turns.enough and not of.size_is_open and "attachments" not in groups:
+    if turns is not None and turns.enough and not of.has_unknown_poses and "attachments" not in groups:
         groups = (*groups, "attachments")
         prior["attachments"] = usual_error(of)
     arms = of.robot.attachments.std(axis=0)
@@ -106,5 +106,5 @@ def is_elastic(solved: Solved) -> bool:
 def uses_slack(solved: Solved) -> bool:
     """Return whether a fit with elasticity uses readings of cables that hardly pull by its own tensions."""
     of = solved.model
-    felt = None if of.felt is None or of.size_is_open else carrying(of, solved.fit.state)
+    felt = None if of.felt is None or of.has_unknown_poses else carrying(of, solved.fit.state)
     return felt is not None and bool((of.weights & hardly_pull(felt.tensions).T).mean() > LOOSE)

@@ -3,19 +3,13 @@
 One step of the fit with zeros as further parameters shows how large they are, and whether the log determines them.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..logs.load_cells import unreadable
 from ..logs.measurements import Measurements
 from ..pose.estimate import largest_cost
 from .considered import from_thrusts
-from .fit import held
-from .geometry import length_of
-from .normal_equations import NormalEquations, metric
-from .parameters import Parameters
-from .solving import Solved, inflation_of
+from .solving import Solved, inflation_of, one_step
 
 USUAL = 0.1  # of the mean tension, standard deviation of zeros
 CERTAIN = 1e-6  # probability that random errors of the tensions look like zeros
@@ -38,23 +32,18 @@ def has_zeros(solved: Solved) -> bool:
     standard deviations then include them. It should not if accelerations are unknown, because these may look
     like zeros, or if tensions follow from thrusts.
     """
-    of, state = solved.model, solved.fit.state
+    of = solved.model
     measured, groups, forces = of.measurements, of.parameters.groups, of.balanced
     if forces is None or measured.tensions is None or not groups or "zeros" in groups:
         return False
-    unknown = of.size_is_open
+    unknown = of.has_unknown_poses
     if from_thrusts(of.robot) or (unknown and not forces.at_rest):
         return False
     groups, prior = with_zeros(measured, groups, of.prior)
-    model = replace(of, parameters=replace(of.parameters, groups=groups), prior=prior)
-    scale, columns = metric(model), np.flatnonzero(Parameters(model.robot, ("zeros",)).varies)
-    equations = NormalEquations.at(model, state, scale)
-    covariance = np.linalg.inv(held(equations.S, length_of(model.robot)))
-    own = np.isin(np.flatnonzero(model.parameters.varies), columns)
-    zeros, spread = (-covariance @ equations.b)[own], covariance[np.ix_(own, own)]
-    squares = float(zeros @ np.linalg.solve(spread, zeros)) / inflation_of(solved.noise)
-    size = np.sqrt(((zeros / scale[columns]) ** 2).mean()) / float(np.abs(measured.tensions).mean())
+    zeros, covariance = one_step(solved, "zeros", groups, prior)
+    squares = float(zeros @ np.linalg.solve(covariance, zeros)) / inflation_of(solved.noise)
+    size = np.sqrt((zeros**2).mean()) / float(np.abs(measured.tensions).mean())
     if squares > largest_cost(len(zeros), CERTAIN) and size > SMALLEST:
         return True
-    open_ = np.sqrt(np.diag(spread)) / scale[columns] > DECIDED * prior["zeros"]
+    open_ = np.sqrt(np.diag(covariance)) > DECIDED * prior["zeros"]
     return not unknown and bool((open_ & ~unreadable(measured.tensions, measured.lengths).all(axis=0)).any())
