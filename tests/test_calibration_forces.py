@@ -132,6 +132,7 @@ def test_a_sensor_mounted_askew_is_no_wrong_com():
     assert error @ np.linalg.solve(result.covariance[np.ix_(at, at)], error) < chi2.ppf(1 - 1e-3, len(at))
     assert np.sqrt(((result.poses - poses)[:, :3] ** 2).sum(axis=1).mean()) < 0.02
     assert max(result.parameters[k].sigma for k in at[4:]) < 0.015  # [m, rad]
+    assert "mounted askew" in result.report()
 
 
 def test_residuals_show_how_wrong_the_anchors_of_a_file_are():

@@ -91,6 +91,18 @@ def test_locked_winches_and_poses_in_two_files(tmp_path):
         read_measurements(tmp_path / "winches.csv", poses=tmp_path / "camera1e+06.csv", robot=robot)
 
 
+def test_locked_winches_show_how_wrong_the_anchors_of_a_file_are(tmp_path):
+    """The swing shows about how far anchors are off the file's: by more than files usually are, to a factor of 3."""
+    robot = load(tmp_path / user.hanging_robot(tmp_path))
+    read, size = read_measurements(user.locked(tmp_path), robot=robot), 0.015  # [m]
+    for seed in range(3):
+        moved = user.FRAME + np.random.default_rng(seed).normal(0, size, (4, 3))
+        names = {f"cables[{i}].anchor.{axis}": moved[i, k] for i in range(4) for k, axis in enumerate("xyz")}
+        result = calibrate(robot.with_parameters(names), read)
+        assert "(as residuals show) of the file's anchors" in result.report()
+        assert all(size / 3 < one.sigma < 3 * size for one in result.parameters)
+
+
 def test_rests_with_an_ahrs_and_load_cells(tmp_path):
     robot, offsets = user.hanging_robot(tmp_path), np.array([0.06, 0.006, -0.02, -0.01])
     places = user.statics(tmp_path, offsets)

@@ -3,7 +3,8 @@
 Parameters f are fitted with the ends c of the file. With the normal matrix S of both, an error of the ends moves the
 fit by -S_ff^-1 S_fc dc, whose covariance is added to that of the readings' noise (consider covariance, Schmidt 1966).
 
-Without measured positions anchors are as wrong as residuals show, if these show more than the usual errors of files.
+Without measured positions, or with locked winches, anchors are as wrong as residuals show, if these show more than the
+usual errors of files.
 For them, with T = S_cc - S_cf S_ff^-1 S_fc = Q diag(t) Q' and the gradient g of half the sum of squares, errors of
 variance s^2 give the components of Q'g the variances t + t^2 s^2 for noise as stated; s maximises their likelihood.
 """
@@ -14,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...models.robot import Robot
+from .clock import is_still
 from .geometry import length_of
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
@@ -71,7 +73,8 @@ def considered(model: Model, state: State, inverse: np.ndarray, excess: float, r
     equations = NormalEquations.at(whole, state, scale)
     S, across = equations.S, inverse @ equations.S[np.ix_(free, ~free)]
     error, anchors = usual_error(model), Parameters(model.robot, ENDS[:1]).varies[every[~free]]
-    if model.size_is_open and uncertain is None and redundancy > 0 and stand and anchors.any():
+    shown = model.size_is_open or is_still(model.measurements)
+    if shown and uncertain is None and redundancy > 0 and stand and anchors.any():
         T = (S[np.ix_(~free, ~free)] - S[np.ix_(~free, free)] @ across)[np.ix_(anchors, anchors)]
         gradient = (equations.b[~free] - across.T @ equations.b[free])[anchors]
         error = _shown(T, gradient, excess**2 * redundancy, redundancy, error, LARGEST * length_of(model.robot))

@@ -136,7 +136,9 @@ def _of_noise(result: CalibrationData) -> list[str]:
     for frame, end in ENDS.items():
         size = f"wrong by {_mm(result.prior[end])}" if end in result.prior else "exact"
         what = "the frame of the poses" if frame == "frame" else "the measured body"
-        if frame in result.free:
+        if frame == "body" and frame in result.free and result._solved.model.size_is_open:
+            found = "the sensor of the orientations looks mounted askew (body.turn corrects it)"
+        elif frame in result.free:
             found = f"{what} was found from the file's {end}, which are assumed to be {size}"
         elif end in result.prior:
             found = f"where the log hardly tells how {end} differ from the file's, these are assumed to be {size}"
