@@ -391,5 +391,7 @@ def needs_balance(robot: Robot, measurements: Measurements) -> bool:
     """Return whether gravity tells more of unknown poses than lengths do: with tensions, or with few cables."""
     if measurements.directions is not None:  # which tell more, also in motion
         return False
-    unknown = not measured_poses(robot, measurements)[2][:, robot.dof_mask > 0].all()
-    return unknown and robot.weight > 0 and (measurements.tensions is not None or robot.m < robot.dof_mask.sum())
+    moves, known = robot.dof_mask > 0, measured_poses(robot, measurements)[2]
+    placed = known[:, :3][:, moves[:3]].all()  # so lengths tell how the platform is turned
+    few = robot.m < moves.sum() or (measurements.tensions is not None and not placed)
+    return bool(few and robot.weight > 0 and not known[:, moves].all())
