@@ -3,8 +3,9 @@
 A loop of bandwidth w with an observer of bandwidth K, whose state is T late without being predicted, and whose measured
 positions and velocities have the noise s_x and s_v, keeps
 
-    (w + K) T <= 1        w^2 s_x + (2 w + K) s_v <= 0.05 g
+    (w + K) T <= 1        w^2 s_x + (2 w + K) s_v <= 0.05 g        L / g (w^4 s_x + 4 w^3 s_v) <= 0.15 g
 
+the last with cables of fixed length L of a team, whose carriers have to move before the load accelerates.
 Defaults keep 0.03 g on robots with at least as many cables as degrees of freedom, whose winches follow the noise.
 States without a time are predicted over the known delay. It may be wrong by 30 %, and T has 80 % of it. Two standard
 deviations of the tensions that noise of velocities requires are inside the limits at home. At about twice these bounds
@@ -44,6 +45,7 @@ from .watch import KNOWN, OFTEN, WINDOW
 from .weights import accelerations, ripple
 
 NOISE = 0.05  # of gravity: acceleration by noise of the measured state
+SHAKEN = 0.15  # the same of carriers of a team, which accelerate to lean the cables with which a load accelerates
 LOST, UNSTABLE = 2.0, 1.5  # times the bounds: robots are lost
 DELAY, PERIOD = 0.647, 1.0  # times the inverse of h: where a late or a held state alone makes attitude loops unstable
 LAG = UNSTABLE / 2  # as late as a period that leaves attitude loops the same margin
@@ -120,7 +122,8 @@ def bandwidths_for(
             f"sensors must permit at least {quantity(100 * LEAST, '%')} of the default bandwidths, {usual.bandwidth:g} "
             f"and {usual.observer:g} rad/s, got {reason}, which permits {quantity(100 * part, '%', 2)}"
         )
-    part = min(part, usual.most, max(errors.permit_noise(usual.bandwidth, usual.observer, errors.calm), LEAST))
+    by_noise = errors.permit_noise(usual.bandwidth, usual.observer, errors.calm)
+    part = min(part, usual.most, max(min(by_noise, errors.permit_leaning(usual.bandwidth)), LEAST))
     given = np.full(6, part * usual.bandwidth) if w is None else w, part * usual.observer if K is None else K
     part, reason = errors.permit(float(given[0].max()), given[1])
     if LOST * part < 1.0:
@@ -197,6 +200,7 @@ class _Errors(NamedTuple):
     position: float
     velocities: np.ndarray  # (2,), of the position and by rates of angles
     calm: float  # largest acceleration by noise of default bandwidths, of gravity
+    lean: float  # mean length of the cables of a team, over gravity [s^2]
     ripple: float  # two standard deviations of tensions by velocities, of their distance from limits [s]
 
     def permit(self, bandwidth: float, observer: float) -> tuple[float, str]:
@@ -213,6 +217,15 @@ class _Errors(NamedTuple):
         a, b = bandwidth**2 * self.position, (2 * bandwidth + observer) * float(self.velocities.max())
         by_noise = 2 * most * GRAVITY / max(b + np.sqrt(b * b + 4 * a * most * GRAVITY), TINY)
         return min(by_noise, 1.0 / max((2 * bandwidth + observer) * self.ripple, TINY))
+
+    def permit_leaning(self, bandwidth: float) -> float:
+        """Return by which factor a bandwidth may be multiplied until noise accelerates carriers of a team by `SHAKEN`.
+
+        A load below cables of length L accelerates by g / L times what its carriers are ahead, so a loop with four
+        poles at -w accelerates carriers by L / g (w^4 s_x + 4 w^3 s_v).
+        """
+        a, b = self.lean * bandwidth**4 * self.position, self.lean * 4 * bandwidth**3 * float(self.velocities.max())
+        return float(np.roots([a, b, 0.0, 0.0, -SHAKEN * GRAVITY]).real.max()) if a + b > TINY else np.inf
 
 
 def _errors_of(noise: Noise, robot: Robot) -> _Errors:
@@ -231,4 +244,5 @@ def _errors_of(noise: Noise, robot: Robot) -> _Errors:
     limit = CALM if strict else NOISE
     turned = 0.0 if noise.stamped else TURNED * noise.delay if age <= OLDEST else noise.delay
     far, held = float((size * position).max()), step if noise.rate else 0.0
-    return _Errors(turned, held, late, far, size * velocity, limit, most)
+    lean = 0.0 if robot.fixed_lengths is None else float(robot.fixed_lengths.mean()) / GRAVITY
+    return _Errors(turned, held, late, far, size * velocity, limit, lean, most)
