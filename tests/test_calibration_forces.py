@@ -25,7 +25,7 @@ from towline.estimation.calibration.motion import motion_of
 from towline.estimation.calibration.normal_equations import NormalEquations
 from towline.estimation.calibration.parameters import COMMON, FRAMES, GROUPS, OF_CABLE, Parameters
 from towline.estimation.calibration.representative import representative
-from towline.estimation.calibration.solving import solve
+from towline.estimation.calibration.solving import model_of, solve
 from towline.estimation.calibration.stretch import with_elasticity, with_stretch
 from towline.estimation.logs.load_cells import slack
 from towline.estimation.pose.from_log import poses_from_log
@@ -151,6 +151,25 @@ def test_residuals_show_how_wrong_the_anchors_of_a_file_are():
         ratios.append(error @ np.linalg.solve(result.covariance[np.ix_(own, own)], error))
         assert "(as residuals show)" in result.report()
     assert chi2.ppf(1e-3, 14) < sum(ratios) < chi2.ppf(1 - 1e-3, 14)
+
+
+def test_errors_of_attachments_displace_anchors_that_forces_show():
+    """Attachments 4 mm off, as in usual files: without them anchors, offsets and CoM were off by eight sigmas."""
+    squares = []
+    for seed in range(3):
+        _, readings, angles, tensions, offsets = rests(seed)
+        draw = np.random.default_rng(7 + seed)
+        file = robot_file(ANCHORS, ATTACHMENTS + draw.normal(0, 4e-3, (4, 3)), COM, MASS, [0, 0, 1.4, 0, 0, 0])
+        sigma = {"lengths": 1e-3, "rotation": AHRS, "tensions": 0.02}
+        log = Measurements(readings, orientations=angles, tensions=tensions, sigma=sigma)
+        result = calibrate(file, log, ("anchors", "offsets", "com"))
+        truth = np.concatenate([np.hstack([ANCHORS, offsets[:, None]]).ravel(), COM])
+        error = np.array([one.value for one in result.parameters]) - truth
+        values, vectors = np.linalg.eigh(result.covariance)
+        known = values > 1e-10 * values[-1]  # not the position of all, for example
+        assert known.sum() == 16
+        squares.append((error @ vectors[:, known]) ** 2 @ (1 / values[known]))
+    assert chi2.ppf(1e-3, 48) < sum(squares) < chi2.ppf(1 - 1e-3, 48)
 
 
 def hung(lengths):
@@ -557,6 +576,17 @@ def test_cables_are_slack_by_the_weight_of_a_body_whose_com_is_wrong_in_the_file
     known = calibrate(robot.model_copy(update={"cables": stiff}), found.measurements)
     assert "com" in known.free
     assert np.abs(known.robot.platform.com - COM)[:2].max() < 3e-3
+
+
+def test_tensions_of_a_platform_are_those_of_all_parts_where_one_is_not_finite(monkeypatch):
+    _, robot, log = hanging(1, 2e-5)
+    model = model_of(robot, log, ("anchors", "offsets", "elasticity"), {})
+    state, whole = model.begin(), carrying(model, model.begin(), True)
+    monkeypatch.setattr("towline.estimation.calibration.model.PART", 100)
+    shift = np.where(np.arange(len(log))[:, None] == 250, np.nan, state.shift)
+    parts = carrying(model, state._replace(shift=shift), True)
+    assert parts.errors.shape == whole.errors.shape == (300, 3, 6)
+    np.testing.assert_allclose(parts.errors[:200], whole.errors[:200])
 
 
 def test_blocks_of_a_long_log_show_stretch_as_all_samples_do(monkeypatch):

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from towline.base.errors import InputError
 from towline.estimation.calibration import Measurements, calibrate, corrected, mistake
 from towline.estimation.calibration.correction import correction_of
+from towline.estimation.calibration.file_errors import loose
 from towline.estimation.logs.clocks import realigned
 from towline.models import Dynamics, load, points
 from towline.solvers import solve_batch
@@ -286,6 +287,11 @@ def test_standard_deviations_include_the_error_of_a_frame_that_was_found():
         z += [(one.value - true[one.name]) / one.sigma for one in result.parameters if one.name in true]
     assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.6  # 9 numbers, nearly three of them independent
     assert "frame" in calibrate("cogiro", fixed, "auto").free
+
+
+def test_files_of_stadiums_may_be_wrong_by_metres():
+    """The errors of a file follow from a log, up to this limit, as without frames (`undetermined`)."""
+    assert loose(120.0, ("anchors", "offsets", "frame"), {}) == {"anchors": pytest.approx(3.6)}
 
 
 @pytest.mark.parametrize("what", ["frame turned", "cables reversed"])

@@ -266,7 +266,7 @@ class Balance:
         forces, rows = self._forces(of, x, placed, clock, 1.0), self._rows
         motion, tensions = self._log.motion, forces.most_likely
         if forces.inverse_root is None or self.at_rest:
-            return FeltTensions(tensions, np.zeros((*tensions.shape, 0)))
+            return FeltTensions(tensions, np.zeros((*tensions.shape, 0 if self.at_rest else 6)))
         wrench = np.zeros((len(tensions), 6, 6))
         force = (x[of.clock + 1] * motion.sigma[self._chosen])[:, None, None]
         wrench[:, :3, :3] = force * np.eye(3)

@@ -28,7 +28,7 @@ DETERMINED = 0.1  # of the variance of the first prior
 def loose(length: float, groups: tuple[str, ...], prior: Mapping[str, float]) -> dict[str, float]:
     """Return standard deviations with loose ones for anchors and attachments that may move with unknown frames."""
     ends = [end for frame, end in ENDS.items() if frame in groups and end in groups and end not in prior]
-    return dict(prior) | dict.fromkeys(ends, min(LOOSE, LOOSE_SHARE * length))
+    return dict(prior) | dict.fromkeys(ends, LOOSE_SHARE * length)
 
 
 def undetermined(solved: Solved) -> dict[str, float]:

@@ -82,7 +82,7 @@ def _names(N: np.ndarray, parameters: Parameters, state: State, scale: np.ndarra
     names: list[str] = []
     rest = N
     varies = parameters.varies
-    for words, generator in _generators(parameters, state):
+    for words, generator in generators(parameters, state):
         if not rest.shape[1]:
             break
         own = generator * scale
@@ -100,7 +100,7 @@ def _names(N: np.ndarray, parameters: Parameters, state: State, scale: np.ndarra
     return (*names, *_by_parameters(rest, parameters, state))
 
 
-def _generators(parameters: Parameters, state: State) -> Iterator[tuple[str, np.ndarray]]:
+def generators(parameters: Parameters, state: State) -> Iterator[tuple[str, np.ndarray]]:
     """Yield the possible gauges: name, and changes of all parameters, (P,)."""
     table = parameters.table(state.x)
     turned, placed = parameters.carriers

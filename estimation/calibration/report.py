@@ -183,6 +183,14 @@ def _of_noise(result: CalibrationData) -> list[str]:
             f"errors of {_mm(again.sigma * result.residual_after)} repeat with the {what}, as of {cause} that the "
             "model lacks, and more samples do not average them: the standard deviations below include them"
         )
+    if (missing := result.missing_pulleys) is not None:
+        (axis, radius), *others = missing.radii.items()
+        also = "".join(f", or of {_mm(size)} with axes {way}" for way, size in others)
+        lines.append(
+            f"the cables seem to run over pulleys with a radius of about {_mm(radius)} and swivel axes {axis}{also}, "
+            "which the file lacks: give its cables the key pulley, because anchors without pulleys are displaced; the "
+            "standard deviations below include this error"
+        )
     if result.autocorrelation > 1:
         tense = result.measurements.tensions is not None or hangs(result.file, result.measurements)
         lasting = f"perhaps because the model is incomplete{'' if tense else UNKNOWN}"

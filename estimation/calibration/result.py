@@ -22,6 +22,7 @@ from .differences import PLAUSIBLE
 from .file_errors import ENDS
 from .geometry import length_of
 from .load_changes import load_changes
+from .missing_pulleys import MissingPulleys, missing_pulleys
 from .outliers import Outlier, Slip
 from .parameters import IN_BALANCE, Parameter, Parameters
 from .plausibility import Mistake
@@ -213,7 +214,13 @@ class CalibrationData(Displayed):
         It is zero along unobservable directions. It is scaled up if residuals are larger than stated or autocorrelated
         (`noise`, `autocorrelation`).
         """
-        return covariance_of(self._solved)
+        missing = self.missing_pulleys
+        return covariance_of(self._solved) + (0.0 if missing is None else missing.covariance)
+
+    @cached_property
+    def missing_pulleys(self) -> MissingPulleys | None:
+        """Return pulleys that the cables seem to run over, but that the file lacks, or None."""
+        return missing_pulleys(self._solved)
 
     @cached_property
     def information(self) -> np.ndarray:

@@ -25,7 +25,7 @@ SIGMA = 1e-3  # [m] of lengths
 LARGEST_SIGMA = 100.0  # [m], [rad] or [-]
 OF_TENSIONS = 0.02  # of tensions, relative
 OF_DIRECTIONS = 0.02  # [rad]
-MOST = 10_000_000  # samples
+MOST, CHUNK = 10_000_000, 100_000  # samples in all, and of which attitudes are converted together
 ARRAYS = ("lengths", "poses", "tensions", "times", "carrier_poses", "directions")  # of `Measurements`
 
 
@@ -313,7 +313,8 @@ def _angles(orientations: Any, count: int) -> np.ndarray:
             f"orientations must be quaternions of length 1, got {shown(array[row].tolist())} at sample {row}"
         )
     result = np.full((count, 3), np.nan)
-    result[known] = points.angles(Rotation.from_quat(array[known]).as_matrix())
+    for rows in np.array_split(np.flatnonzero(known), count // CHUNK + 1):  # matrices of all would need much memory
+        result[rows] = points.angles(Rotation.from_quat(array[rows]).as_matrix())
     return result
 
 

@@ -127,12 +127,12 @@ def interpolated(times: np.ndarray, samples: Samples) -> np.ndarray:
         return np.full((len(times), values.shape[1]), np.nan)
     check_rising(own)
     apart = float(np.median(np.diff(own)))
-    if len(own) >= 4 and len(times) > 1 and MUCH_FASTER * apart > float(np.median(np.diff(times))):
-        from scipy.interpolate import CubicSpline
+    smooth = len(own) >= 4 and len(times) > 1 and MUCH_FASTER * apart > float(np.median(np.diff(times)))
+    from scipy.interpolate import CubicSpline
 
-        result = CubicSpline(own, values)(times)
-    else:
-        result = np.column_stack([np.interp(times, own, column) for column in values.T])
+    result = np.empty((len(times), values.shape[1]))
+    for k, column in enumerate(values.T):  # coefficients of all columns at once would need much memory
+        result[:, k] = CubicSpline(own, column)(times) if smooth else np.interp(times, own, column)
     after = np.clip(np.searchsorted(own, times), 1, len(own) - 1)
     outside = (own[after] - own[after - 1] > GAP * apart) | (times < own[0]) | (times > own[-1])
     result[outside] = np.nan
@@ -151,10 +151,10 @@ def complete_samples(values: np.ndarray, fields: Sequence[Field]) -> np.ndarray:
     kept = finite.all(axis=1)
     if are_too_partial(finite):
         row, column = (int(i) for i in np.argwhere(~finite)[0])
+        most = f", and at most {quantity(100 * MOST_PARTIAL)} % may have only some of their numbers"
         raise InputError(
             f"{fields[column].full} must be a finite number at sample {row}, got {values[row, column]:g}; "
-            f"{quantity(int((~kept).sum()))} of {quantity(len(finite))} samples are incomplete, and at most "
-            f"{quantity(100 * MOST_PARTIAL)} % may have only some of their numbers"
+            f"{quantity(int((~kept).sum()))} of {quantity(len(finite))} samples are incomplete{most * bool(kept.any())}"
         )
     return np.asarray(kept)
 

@@ -1,0 +1,104 @@
+"""Calibration of robots whose cables run over pulleys that their files lack, against lengths from plain NumPy."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
+
+from towline.estimation.calibration import Measurements, calibrate, missing_pulleys
+
+from .framed import framed
+
+CORNERS = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
+FLAT = np.array([[-1.5, 0, 0], [1.5, 0, 0], [1.5, 0, 2.2], [-1.5, 0, 2.2]])
+ABOVE = np.column_stack([CORNERS * [1.8, 1.5], [2.5, 2.6, 2.4, 2.5]])
+BOX = np.vstack([np.column_stack([CORNERS * [2.0, 1.6], np.full(4, height)]) for height in (2.5, 0.1)])
+ON_BOX = np.vstack([np.column_stack([CORNERS * [0.2, 0.15], np.full(4, height)]) for height in (-0.12, 0.12)])
+ROBOTS = {  # anchors, attachments, amplitudes of the motion, coordinates
+    "planar": (FLAT, FLAT * 0.1 - [0, 0, 0.11], [0.8, 0, 0.5, 0, 0.15, 0], ["x", "z", "pitch"]),
+    "point": (ABOVE, np.zeros((4, 3)), [1.0, 0.8, 0.5, 0, 0, 0], ["x", "y", "z"]),
+    "box": (BOX, ON_BOX, [1.2, 0.9, 0.6, 0.15, 0.15, 0.2], ["x", "y", "z", "roll", "pitch", "yaw"]),
+}
+
+
+def over_pulleys(anchors, axis, radius, ends):
+    """Lengths of cables to ends (N, m, 3): an arc in the plane of axis and end, then a tangent."""
+    up = ((ends - anchors) * axis).sum(axis=2)
+    beside = np.linalg.norm(ends - anchors - up[..., None] * axis, axis=2) - radius  # of the sheave's centre
+    apart = np.hypot(beside, up)
+    arc = np.pi - np.arctan2(up, beside) - np.arccos(radius / apart)
+    return np.sqrt(apart**2 - radius**2) + radius * arc
+
+
+def a_log(kind, seed, radius, axis=(0, 0, 1)):
+    """The robot's file, 60 s of a motion with poses known to 1 mm, and the true anchors and offsets (m, 4)."""
+    draw, (anchors, attachments, moves, dof) = np.random.default_rng(seed), ROBOTS[kind]
+    body = {"mass": 8.0, "inertia": [0.1, 0.1, 0.1, 0, 0, 0], "home": [0, 0, 1.1, 0, 0, 0], "dof": dof}
+    file = framed(zip(anchors, attachments, strict=True), body)
+    t, moves = 0.04 * np.arange(1500), np.array(moves)
+    waves = np.sin(np.multiply.outer(t, draw.uniform(0.3, 1.5, (4, 6))) + draw.uniform(0, 6, (4, 6))).sum(axis=1)
+    poses = file.home + moves * waves / np.abs(waves).max(axis=0)
+    built = anchors + draw.normal(0, 0.01, anchors.shape) * file.dof_mask[:3]
+    turned = Rotation.from_euler("xyz", poses[:, 3:]).as_matrix()
+    ends = poses[:, None, :3] + np.einsum("nij,mj->nmi", turned, attachments)
+    offsets = draw.normal(0, 0.1, len(anchors))
+    readings = over_pulleys(built, np.array(axis), radius, ends) - offsets + draw.normal(0, 1e-3, ends.shape[:2])
+    seen = poses + draw.normal(0, 1e-3, poses.shape) * file.dof_mask
+    log = Measurements(readings, seen, times=t, sigma={"lengths": 1e-3, "position": 1e-3, "rotation": 1e-3})
+    return file, log, np.hstack([built, offsets[:, None]])
+
+
+def surprise(result, truth):
+    """Squares of the errors of anchors and offsets by their covariance, and the number of these."""
+    known = [k for k, one in enumerate(result.parameters) if one.name.startswith("cables") and one.sigma < np.inf]
+    at = [("x", "y", "z", "offset").index(result.parameters[k].name.split(".")[-1]) for k in known]
+    cables = [int(result.parameters[k].name[7]) for k in known]
+    error = np.array([result.parameters[k].value for k in known]) - truth[cables, at]
+    return error @ np.linalg.solve(result.covariance[np.ix_(known, known)], error), len(known)
+
+
+@pytest.mark.parametrize(
+    ("kind", "radius", "axis"),
+    [("planar", 0.05, (0, 0, 1)), ("point", 0.02, (0, 0, 1)), ("point", 0.05, (1, 0, 0)), ("box", 0.08, (0, 0, -1))],
+)
+def test_standard_deviations_include_pulleys_that_the_file_lacks(kind, radius, axis):
+    """Anchors without pulleys fit the log to its noise, and are wrong by more than the radius."""
+    file, log, truth = a_log(kind, 1, radius, axis)
+    result = calibrate(file, log)
+    assert np.abs(result.robot.anchors - truth[:, :3]).max() > radius
+    (way, found), *_ = result.missing_pulleys.radii.items()
+    assert way in {(0, 0, 1): ("z",), (1, 0, 0): ("x",), (0, 0, -1): ("-z",)}[axis]
+    assert found == pytest.approx(radius, rel=0.2)
+    squares, count = surprise(result, truth)
+    assert squares < chi2.ppf(0.999, count)
+    assert "which the file lacks" in result.report()
+
+
+def test_pulleys_above_and_below_have_axes_of_their_own(monkeypatch):
+    """Winches halfway up, from which cables go up to some pulleys, and down to others; some samples show that."""
+    monkeypatch.setattr(missing_pulleys, "MOST_SAMPLES", 500)
+    file, log, truth = a_log("box", 2, 0.06, np.repeat([[0, 0, 1], [0, 0, -1]], 4, axis=0))
+    result = calibrate(file, log)
+    (way, found), *_ = result.missing_pulleys.radii.items()
+    assert way == "away from the platform along z"
+    assert found == pytest.approx(0.06, rel=0.2)
+    squares, count = surprise(result, truth)
+    assert squares < chi2.ppf(0.999, count)
+
+
+@pytest.mark.parametrize("kind", ROBOTS)
+def test_a_sound_log_shows_no_pulleys(kind):
+    for seed in range(3):
+        file, log, truth = a_log(kind, seed, 0.0)
+        result = calibrate(file, log)
+        assert result.missing_pulleys is None
+        assert "pulleys" not in result.report()
+        squares, count = surprise(result, truth)
+        assert squares < chi2.ppf(0.999, count)
+
+
+def test_anchors_that_are_displaced_together_hide_no_pulleys():
+    """Poses in a frame 0.5 m off: residuals of a planar robot show no radius, but its anchors do."""
+    file, log, _ = a_log("planar", 1, 0.08)
+    result = calibrate(file, log.changed(poses=log.poses + [0.4, 0, -0.3, 0, 0, 0]))
+    assert result.missing_pulleys.radii["z"] == pytest.approx(0.08, rel=0.2)
