@@ -23,9 +23,10 @@ from ..solvers import solve_batch
 from ..solvers.margins import Reserves, all_reserves, margins, reserves
 from ..statics.stiffness import frequencies_of
 from ..workspace.conditions.interference import nearest_points
+from .goal import Goal, Outcome
 from .requirements import Requirement
 from .room import Region, Room
-from .variables import Goal, Outcome, Variables, parts
+from .variables import Variables, parts
 
 NO_BOUNDS = Room()
 ByVariables = Callable[[np.ndarray, np.ndarray], np.ndarray]  # (poses, columns), (k,) each -> (k, p)

@@ -13,9 +13,10 @@ from ..statics.stiffness import natural_frequencies
 from ..workspace.conditions.interference import cable_distances, outside
 from ..workspace.feasibility import NEAREST
 from .evaluation import Evaluation, Rows
+from .goal import Goal
 from .linear_programs import LITTLE, multipliers
 from .room import Room
-from .variables import Goal, Variables
+from .variables import Variables
 
 _JUDGED = 100  # worst rows, by `capacity_margin`
 _CONVERGED = 1e-3  # of the margin that is maximised, or of `LITTLE`: what a program still gains at a local optimum

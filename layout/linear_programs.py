@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from .evaluation import Evaluation, Slopes
-from .variables import Goal
+from .goal import Goal
 
 MOST_RESERVES, MOST_DISTANCES = 150, 100  # smallest ones, which a linear program has
 _PER_SIZE = 200.0  # cost, in force scales, of missing a bound by the size of the robot

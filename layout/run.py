@@ -13,6 +13,7 @@ from ..models import Robot
 from ..models.files import AnyRobot, as_robot
 from ..ocp.planner import plan
 from .evaluation import NO_BOUNDS, Evaluation, rows_of, with_tasks
+from .goal import goal_of
 from .growth import grow
 from .impossibility import find_impossibility
 from .judgement import judge, judged_margin, reasons
@@ -21,7 +22,7 @@ from .requirements import Free, Requirement, Requirements, read_requirements
 from .result import Design
 from .room import room_of
 from .search import ROOM_AUDITED, Found, Progress, audited_rows, few, search
-from .variables import Variables, goal_of, variables_of
+from .variables import Variables, variables_of
 
 USUAL_SHARE = 0.1  # of the robot's weight: the margin if that is less than the usual one
 

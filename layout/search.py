@@ -11,12 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..models import Robot
-from .annealing import Mirrors, Moves, anneal
+from .annealing import Moves, anneal
 from .evaluation import FEW_INSTANTS, Evaluation, Rows, rows_of, with_tasks
+from .goal import NOTHING, Goal, Outcome, goal_of
 from .linear_programs import PROGRAMS, maximise, merit
 from .requirements import Requirements
 from .room import room_of
-from .variables import NOTHING, Goal, Outcome, Variables, goal_of
+from .symmetry import Mirrors
+from .variables import Variables
 
 Progress = Callable[[str, float, float], None]  # what is being done, the share of time, the best margin so far [N]
 

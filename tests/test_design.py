@@ -24,13 +24,14 @@ from towline import (
 from towline.layout import Free, run
 from towline.layout import search as searching
 from towline.layout.evaluation import Evaluation, rows_of
+from towline.layout.goal import Goal
 from towline.layout.impossibility import find_impossibility
 from towline.layout.judgement import reasons
 from towline.layout.linear_programs import maximise
 from towline.layout.pairings import with_attachments
 from towline.layout.room import Room
 from towline.layout.search import search
-from towline.layout.variables import Goal, variables_of
+from towline.layout.variables import variables_of
 from towline.models.points import placed, rotations
 from towline.models.record import record_of
 from towline.solvers import capacity_margin

@@ -10,8 +10,9 @@ from towline import Dynamics, InputError, Robot, TensionProblem, design, load, r
 from towline.cli.new import TEMPLATES
 from towline.layout import growth, search
 from towline.layout.evaluation import Evaluation, rows_of
+from towline.layout.goal import goal_of
 from towline.layout.linear_programs import maximise
-from towline.layout.variables import goal_of, variables_of
+from towline.layout.variables import variables_of
 from towline.solvers import capacity_margin
 
 ROBOT = load("ipanema-2")

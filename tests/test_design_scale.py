@@ -6,10 +6,11 @@ import pytest
 from towline import Dynamics, InputError, Robot, TensionProblem, design, load, read_requirements
 from towline.layout import judgement
 from towline.layout.evaluation import Evaluation, rows_of
+from towline.layout.goal import goal_of
 from towline.layout.judgement import reasons
 from towline.layout.linear_programs import maximise, merit
 from towline.layout.room import room_of
-from towline.layout.variables import goal_of, variables_of
+from towline.layout.variables import variables_of
 from towline.solvers import certify
 
 SIZE, FORCE = 1 / 200, 1 / 40  # a frame of 4 cm, of cables with at most 5 N

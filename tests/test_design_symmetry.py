@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from towline import Robot, load, read_requirements
-from towline.layout.annealing import Mirrors, Moves
+from towline.layout.annealing import Moves
 from towline.layout.evaluation import Evaluation, rows_of
+from towline.layout.symmetry import Mirrors
 from towline.layout.variables import variables_of
 
 HERE = np.array([[0.7, 0.4, 1.2, 0.0, 0.0, 0.0], [-0.9, 1.1, 2.0, 0.0, 0.0, 0.0], [0.2, -1.3, 1.6, 0.0, 0.0, 0.0]])

@@ -6,7 +6,7 @@ import pytest
 from towline import InputError, load, plan, simulate
 from towline.control import ComputedTorque, Controller, Predictive
 from towline.simulation import Noise
-from towline.simulation.flying import Sensors
+from towline.simulation.sensors import Sensors
 
 PERIOD = 1e-3
 
