@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import InputError
-from .inputs import printable
+from .inputs import InputError, printable
 
 if TYPE_CHECKING:
     import h5py

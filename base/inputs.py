@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
+from .errors import InputError as InputError  # most modules that check arguments raise it
 from .text import quantity
 
 Kind = TypeVar("Kind")

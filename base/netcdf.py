@@ -17,8 +17,7 @@ import numpy as np
 from typing_extensions import override
 
 from .declared import check_hdf5, check_heaps
-from .errors import InputError
-from .inputs import printable, shown
+from .inputs import InputError, printable, shown
 from .reading import check_file
 from .writing import whole_file
 

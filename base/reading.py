@@ -4,8 +4,7 @@ import stat
 from collections import deque
 from pathlib import Path
 
-from .errors import InputError
-from .inputs import printable
+from .inputs import InputError, printable
 
 LARGEST_FILE = 1_000_000  # [bytes]; the largest robot of the library has a few kB
 BLOCK = 2**20  # [bytes]

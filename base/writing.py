@@ -9,8 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from .errors import InputError
-from .inputs import printable
+from .inputs import InputError, printable
 
 _unfinished: dict[Path, list[Path]] = {}  # with the folders made for them, the deepest first
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
-from ..base.errors import InputError
-from ..base.inputs import whole_number
+from ..base.inputs import InputError, whole_number
 from ..control import ComputedTorque, Controller, OpenLoop, Predictive
 from ..models import Robot, load
 from ..simulation import simulate

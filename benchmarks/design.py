@@ -29,8 +29,7 @@ from ..layout.requirements import Requirements
 from ..layout.search import AUDITED, search
 from ..layout.variables import Variables, variables_of
 from ..models import load
-from .harness import alternating, machine
-from .harness import table as table_of
+from .harness import alternating, machine, table as table_of
 
 BOXES = {"cogiro": ((-4.0, -3.0, 0.5), (4.0, 3.0, 3.0)), "ipanema-2": ((-2.0, -1.5, 2.0), (2.0, 1.5, 3.5))}
 DRAWS, POPULATION = 3000, 150

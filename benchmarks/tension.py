@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import InputError
-from ..base.inputs import whole_number
+from ..base.inputs import InputError, whole_number
 from ..base.writing import check_writable, whole_file
 from ..figures import style
 from .harness import alternating, machine, ratio, table

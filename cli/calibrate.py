@@ -6,8 +6,7 @@ from typing import Any
 
 import typer
 
-from ..base.errors import InputError
-from ..base.inputs import check_ending
+from ..base.inputs import InputError, check_ending
 from .log import FieldsOption, FixOption
 from .options import FormatOption, JsonOption, ReportOption, RobotArgument, parameters
 from .outputs import Outputs, check_outputs

@@ -5,8 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..base.errors import InputError
-from ..base.inputs import check_ending
+from ..base.inputs import InputError, check_ending
 from .options import FormatOption, JsonOption, ReportOption, RobotArgument, parameters, schema_option, usual_file
 from .outputs import Outputs, check_outputs
 from .stopping import requested, unlisten
@@ -41,8 +40,7 @@ def design(
     The exit code is 1 if no layout that meets the requirements was found, or if none exists, which is then proven.
     Ctrl-C ends the search with the best layout so far.
     """
-    from ..layout import Requirements, read_requirements
-    from ..layout import design as find
+    from ..layout import Requirements, design as find, read_requirements
     from ..models import load
     from ..models.parsing import validate
 

@@ -6,8 +6,7 @@ from typing import Annotated
 
 import typer
 
-from ..base.errors import InputError
-from ..base.inputs import one_of, shown
+from ..base.inputs import InputError, one_of, shown
 from .options import JsonOption, parameters, print_json, print_written
 
 TEMPLATES = Path(__file__).parent / "templates"

@@ -5,8 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..base.errors import InputError
-from ..base.inputs import check_ending, shown
+from ..base.inputs import InputError, check_ending, shown
 from ..base.processors import one_thread_each
 from . import options
 from .outputs import Outputs, check_outputs
@@ -75,8 +74,7 @@ def plan(
     when = "without --vary: it is an option for many plans"
     options.left_out({**many, "--resume": resume, "--keep": keep}, when, got=False)
     from ..models import load
-    from ..ocp import plan as plan_motion
-    from ..ocp import read_task
+    from ..ocp import plan as plan_motion, read_task
 
     loaded, read = load(robot), read_task(task)
     target = check_ending("--out", out or options.usual_file(loaded.name, f"{read.name}.nc"), ".nc", ".mcap")
@@ -103,8 +101,7 @@ def sweep(robot: str, task: Path, vary: list[str], where: dict[str, Any], out: P
     `where` has options of `ocp.sweep`: the workers, the checkpoint, and the folder of plans to keep.
     """
     from ..models import load
-    from ..ocp import read_task
-    from ..ocp import sweep as sweep_plans
+    from ..ocp import read_task, sweep as sweep_plans
     from ..ocp.sweeps.axis import check_figure, read_axes, read_option
 
     loaded, read, picture = load(robot), read_task(task), outputs.picture("sweep")

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from ..base.errors import InputError
-from ..base.inputs import check_ending
+from ..base.inputs import InputError, check_ending
 from . import options
 from .calibrate import by_name
 from .log import FieldsOption, FixOption

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from ..base.errors import InputError
-from ..base.inputs import check_ending, one_of, printable, shown
+from ..base.inputs import InputError, check_ending, one_of, printable, shown
 from ..base.processors import one_thread_each
 from . import options
 from .log import FieldsOption, FixOption
@@ -187,8 +186,7 @@ def _once(run: Callable[[], Simulation], plan: str, target: Path, outputs: Outpu
 
 def _often(run: Callable[..., xr.Dataset], plan: str, where: Execution, target: Path, outputs: Outputs) -> bool:
     """Simulate with many seeds, save, draw and print; return whether all runs passed."""
-    from ..figures import flight as figure
-    from ..figures import style
+    from ..figures import flight as figure, style
     from ..simulation.flights import report, save, summary
 
     with counting(f"simulating {plan}", "passed", quiet=outputs.as_json) as show:

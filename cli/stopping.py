@@ -76,9 +76,9 @@ def end() -> NoReturn:
     """End the process with one line and the exit code of the signal; threads that still compute end with it."""
     while not _once.acquire(timeout=GRACE):  # never released: one line, whoever comes first
         pass
-    processes = sys.modules.get("towline.base.processes")  # no process was started where it was never loaded
-    if processes is not None:
-        processes.end_processes()
+    execution = sys.modules.get("towline.base.execution")  # no process was started where it was never loaded
+    if execution is not None:
+        execution.end_processes()
     with suppress(OSError, ValueError):
         if sys.stderr.isatty():
             sys.stderr.write(SHOW_CURSOR)

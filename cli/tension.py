@@ -75,7 +75,7 @@ def tension(
 def _show_slipped_units(robot: Robot, pose: np.ndarray, wind: np.ndarray | None) -> None:
     """Print a line for each unit in which numbers of the pose, the wind or the robot seem to be instead."""
     from ..ocp.tasks.task import Task
-    from ..ocp.warnings.slipped_units import slipped_units
+    from ..ocp.warnings.values import slipped_units
 
     task = {"path": {"kind": "rest", "pose": pose.tolist()}, "wind": None if wind is None else wind.tolist()}
     for sentence in slipped_units(robot, Task.model_validate(task)):

@@ -5,8 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..base.errors import InputError
-from ..base.inputs import check_ending
+from ..base.inputs import InputError, check_ending
 from .options import JsonOption, left_out, parameters, print_result, robot_names
 from .outputs import check_outputs
 from .stopping import end_at_once, requested, unlisten

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from ..base.errors import InputError
-from ..base.inputs import check_ending
+from ..base.inputs import InputError, check_ending
 from .options import JsonOption, RobotArgument, numbers, parameters, print_json, print_written
 from .outputs import check_outputs
 from .stopping import add_to_message, requested

@@ -5,8 +5,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..base.errors import InputError
-from ..base.inputs import FLOAT, float64, required, shown
+from ..base.inputs import FLOAT, InputError, float64, required, shown
 from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
 from .controller import Reference, State

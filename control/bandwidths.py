@@ -31,8 +31,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.errors import InputError
-from ..base.inputs import number
+from ..base.inputs import InputError, number
 from ..base.text import quantity
 from ..models.parsing import validate
 from ..models.robot import Robot

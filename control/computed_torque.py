@@ -7,8 +7,7 @@ from warnings import warn
 import numpy as np
 from typing_extensions import override
 
-from ..base.errors import InputError
-from ..base.inputs import number, required, shown
+from ..base.inputs import InputError, number, required, shown
 from ..core import control_step, control_thrusts
 from ..models.files import AnyRobot, as_robot
 from ..models.record import record_of

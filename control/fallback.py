@@ -4,7 +4,7 @@ import numpy as np
 
 from ..models.robot import Robot
 from ..solvers.in_place import InPlace
-from ..solvers.status import OPTIMAL
+from ..solvers.solution import OPTIMAL
 from .controller import HOLD, PLANNED, SOFT
 
 NEGLIGIBLE = 1e-3  # of the robot's scale of forces: a wrench that is missed by less is given as planned

@@ -8,8 +8,7 @@ from warnings import warn
 import numpy as np
 from typing_extensions import override
 
-from ..base.errors import InputError
-from ..base.inputs import required
+from ..base.inputs import InputError, required
 from ..base.text import quantity_row
 from ..models.files import AnyRobot, as_robot
 from ..models.robot import Robot

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from typing_extensions import override
 
-from ..base.errors import InputError
-from ..base.inputs import required, shown
+from ..base.inputs import InputError, required, shown
 from ..core import control_move_on
 from .as_floats import as_floats, measured_at
 from .carried_load import CarriedLoad

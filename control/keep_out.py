@@ -6,8 +6,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from ..base.errors import InputError
-from ..base.inputs import number, shown
+from ..base.inputs import InputError, number, shown
 from ..models.parsing import validate
 from ..models.part import Part
 from ..models.points import placed

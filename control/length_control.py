@@ -7,8 +7,7 @@ from warnings import warn
 import numpy as np
 from typing_extensions import override
 
-from ..base.errors import InputError
-from ..base.inputs import number, repeated, required, shown
+from ..base.inputs import InputError, number, repeated, required, shown
 from ..base.text import quantity
 from ..models.dynamics import dynamics_of
 from ..models.files import AnyRobot, as_robot

@@ -3,8 +3,7 @@
 import numpy as np
 from typing_extensions import override
 
-from ..base.errors import InputError
-from ..base.inputs import required
+from ..base.inputs import InputError, required
 from ..models.files import AnyRobot, as_robot
 from ..models.robot import Robot
 from .as_floats import as_floats, rows_of

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.errors import InputError
-from ..base.inputs import number, shown
+from ..base.inputs import InputError, number, shown
 from ..models.dynamics import dynamics_of
 from ..models.parsing import parse_yaml
 from ..models.rigid_load import RigidLoad

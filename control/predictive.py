@@ -8,8 +8,7 @@ from warnings import warn
 import numpy as np
 from typing_extensions import override
 
-from ..base.errors import InputError
-from ..base.inputs import number, whole_number
+from ..base.inputs import InputError, number, whole_number
 from ..core import control_aim, control_stages
 from ..models.files import AnyRobot, as_robot
 from ..models.shapes import Shape

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.errors import InputError
-from ..base.inputs import number, shown
+from ..base.inputs import InputError, number, shown
 from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
 from .as_floats import as_floats

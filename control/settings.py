@@ -4,8 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.errors import InputError
-from ..base.inputs import number, repeated, shown
+from ..base.inputs import InputError, number, repeated, shown
 from ..models.batch import as_array
 from ..models.robot import Robot
 from .controllability import is_underactuated

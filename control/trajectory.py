@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from pydantic import BaseModel
 
-from ..base.errors import InputError
-from ..base.inputs import file_path, finite_array, number, real_array, shown
+from ..base.inputs import InputError, file_path, finite_array, number, real_array, shown
 from ..base.netcdf import Contents, load_netcdf, numbers_of
 from ..figures.scene import outlines_from
 from ..models.parsing import parse_yaml

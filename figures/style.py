@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.errors import InputError
-from ..base.inputs import file_path, one_of, printable
+from ..base.inputs import InputError, file_path, one_of, printable
 from ..base.text import unbroken
 from ..base.writing import whole_file
 

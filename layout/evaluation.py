@@ -20,7 +20,7 @@ from ..models.record import record_of
 from ..ocp.tasks.lay_out import lay_out
 from ..ocp.tasks.task import Task
 from ..solvers import solve_batch
-from ..solvers.margins import Reserves, all_reserves, margins, reserves
+from ..solvers.margin import Reserves, all_reserves, margins, reserves
 from ..statics.stiffness import frequencies_of
 from ..workspace.conditions.interference import nearest_points
 from .goal import Goal, Outcome

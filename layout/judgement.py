@@ -8,7 +8,7 @@ from ..models import Robot
 from ..models.dynamics import dynamics_of
 from ..models.points import in_frame
 from ..solvers import TensionProblem, capacity_margin, solve_batch
-from ..solvers.margins import margins
+from ..solvers.margin import margins
 from ..statics.stiffness import natural_frequencies
 from ..workspace.conditions.interference import cable_distances, outside
 from ..workspace.feasibility import NEAREST

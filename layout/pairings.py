@@ -6,7 +6,7 @@ import numpy as np
 
 from ..models import Robot
 from ..models.dynamics import dynamics_of
-from ..solvers.margins import margins
+from ..solvers.margin import margins
 from .evaluation import Evaluation, Rows
 from .requirements import Requirements
 from .room import room_of

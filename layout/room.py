@@ -14,7 +14,7 @@ from ..base.errors import InputError
 from ..base.text import quantity, quantity_range
 from ..models import Robot
 from ..models.batch import BLOCK, in_blocks
-from ..models.body import skeleton
+from ..models.shapes import skeleton
 from ..ocp.limits.clearance import cable_outside
 from ..workspace.conditions.interference import segment_distance
 from .requirements import Requirements

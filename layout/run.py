@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import InputError
-from ..base.inputs import shown
+from ..base.inputs import InputError, shown
 from ..models import Robot
 from ..models.files import AnyRobot, as_robot
 from ..ocp.planner import plan

@@ -4,8 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.errors import InputError
-from ..base.inputs import shown
+from ..base.inputs import InputError, shown
 from ..models import Robot
 from .requirements import MOST_PAIRED, POINTS, Free, Requirements
 

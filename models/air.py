@@ -8,8 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..base.errors import InputError
-from ..base.inputs import finite_array, shown
+from ..base.inputs import InputError, finite_array, shown
 
 
 def constant(times: np.ndarray, velocity: Sequence[float]) -> np.ndarray:

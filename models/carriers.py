@@ -16,10 +16,20 @@ from pydantic_core import CoreSchema, core_schema
 from ..base.errors import InputError
 from .arrays import Matrix
 from .parsing import json_schema
-from .part import AT_ORIGIN, BodyInertia, Inertia, Name, NonNegative, Part, Pose, inertia_matrix, optional
-from .part import Box as Box  # these three also for carriers of users' own
-from .part import Finite as Finite
-from .part import Positive as Positive
+from .part import (
+    AT_ORIGIN,
+    BodyInertia,
+    Box as Box,  # these three also for carriers of users' own
+    Finite as Finite,
+    Inertia,
+    Name,
+    NonNegative,
+    Part,
+    Pose,
+    Positive as Positive,
+    inertia_matrix,
+    optional,
+)
 
 Drive = Literal["both", "fixed-length", "variable-length"]
 USUAL_RADIUS = 0.3  # [m] of a quadrotor of 1 kg

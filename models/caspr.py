@@ -30,8 +30,7 @@ from defusedxml.ElementTree import DefusedXMLParser, ParseError
 from scipy.spatial.transform import Rotation
 
 from ..base.display import Displayed
-from ..base.errors import InputError
-from ..base.inputs import shown
+from ..base.inputs import InputError, shown
 from ..base.reading import read_bytes
 from . import points
 from .cable import Cable

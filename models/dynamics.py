@@ -9,14 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.display import Displayed
-from ..base.errors import InputError
-from ..base.inputs import flag, required
+from ..base.inputs import InputError, flag, required
 from . import elasticity
-from .arrays import Array, one_array, several_arrays
+from .arrays import Array, Motion, one_array, several_arrays
 from .batch import SYMBOLIC, as_array, call, is_symbolic
 from .files import AnyRobot, as_robot
 from .mechanics import Mechanics
-from .motion import Motion
 from .part import LARGEST
 from .record import fits
 from .relative_dynamics import RelativeDynamics

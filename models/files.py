@@ -6,8 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import TypeAlias
 
-from ..base.errors import InputError
-from ..base.inputs import file_path, shown
+from ..base.inputs import InputError, file_path, shown
 from .library import FOLDER, available
 from .parsing import read_yaml
 from .robot import Robot

@@ -8,10 +8,9 @@ import numpy as np
 from .. import core
 from ..base import processors
 from ..base.inputs import leading
-from .arrays import Array
+from .arrays import Array, Motion
 from .batch import as_array
 from .cables.elastic import axial_stiffness, unstrained_length
-from .motion import Motion
 from .parameters import locate
 from .record import record_of
 from .robot import Robot

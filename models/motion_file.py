@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import InputError
-from ..base.inputs import check_ending, file_path
+from ..base.inputs import InputError, check_ending, file_path
 from ..base.netcdf import UNITS, Contents, Variable, save_netcdf
 from ..base.writing import whole_file
 from . import points

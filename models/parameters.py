@@ -11,8 +11,7 @@ Cables count from 0, as in error messages about robot files.
 import re
 from typing import NamedTuple
 
-from ..base.errors import InputError
-from ..base.inputs import shown
+from ..base.inputs import InputError, shown
 from .cable import Cable
 
 FORMS = (

@@ -18,8 +18,7 @@ from ruamel.yaml.error import YAMLError
 from ruamel.yaml.events import AliasEvent
 from ruamel.yaml.scanner import Scanner, ScannerError
 
-from ..base.errors import InputError
-from ..base.inputs import LONGEST_TEXT, MOST_ROWS, check_ending, file_path, printable, shown
+from ..base.inputs import LONGEST_TEXT, MOST_ROWS, InputError, check_ending, file_path, printable, shown
 from ..base.reading import read_bytes
 from ..base.text import counted
 from ..base.writing import whole_file

@@ -13,8 +13,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from typing_extensions import override
 
 from ..base.display import Displayed, Fact, brief
-from ..base.errors import InputError
-from ..base.inputs import MOST_ROWS
+from ..base.inputs import MOST_ROWS, InputError
 
 LARGEST = 1e9  # of any number in a file: beyond it squares and products stop being exact enough
 

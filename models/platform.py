@@ -4,8 +4,8 @@ from typing import Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from .body import AnyBody
 from .part import COORDINATES, BodyInertia, Coordinate, NonNegative, Part, Pose, Positive, Vector3, optional
+from .shapes import AnyBody
 
 # Sets with angles for which the wrench rows about the CoM are the equations of these coordinates. About a fixed pivot,
 # or with fewer axes, the reactions of what is locked would enter them.

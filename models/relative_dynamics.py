@@ -21,10 +21,9 @@ import numpy as np
 from ..base.display import Displayed
 from ..base.errors import InputError
 from . import kinematics, rigid_body
-from .arrays import Array, one_array, several_arrays
+from .arrays import Array, Motion, one_array, several_arrays
 from .batch import call
 from .files import AnyRobot, as_robot
-from .motion import Motion
 from .robot import Robot
 from .rotation import Matrix, angles_of, body_rate, inverse_rate_matrix, rate_matrix_derivative, rotation, turning
 

@@ -18,8 +18,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ..base.display import BLUE, ORANGE, Curve, Fact, picture
-from ..base.errors import InputError
-from ..base.inputs import number, printable, required, shown, whole_number
+from ..base.inputs import InputError, number, printable, required, shown, whole_number
 from ..base.text import counted, quantity, quantity_range, quantity_row
 from . import parameters, points
 from .cable import Cable, Encoder

@@ -7,8 +7,8 @@ import casadi as ca
 import numpy as np
 
 from . import elasticity, kinematics, rigid_body
+from .arrays import Motion
 from .cables.pulley import Exit
-from .motion import Motion
 from .robot import Robot
 from .rotation import Matrix
 

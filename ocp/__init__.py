@@ -7,8 +7,7 @@ from .plan import Plan
 from .planner import Planner, plan
 from .sweeps.result import Sweep
 from .sweeps.run import sweep
-from .tasks.status import MotionStatus
-from .tasks.task import Task, read_task
+from .tasks.task import MotionStatus, Task, read_task
 from .timing.time_along import time_along
 
 __all__ = ["MotionStatus", "Plan", "Planner", "Sweep", "Task", "plan", "read_task", "sweep", "time_along"]

@@ -41,7 +41,7 @@ class Plan(PlanData, MotionResult, Reported):
 
         Figures without content are left out, as in `plot`.
         """
-        from .reports.drawings import drawings
+        from .reports.trajectory import drawings
 
         return {name: drawing.figure for name, drawing in drawings(self, self.trajectory).items()}
 
@@ -50,6 +50,6 @@ class Plan(PlanData, MotionResult, Reported):
         return self.scenario.robot
 
     def _report(self) -> Report:
-        from .reports.drawings import drawings
+        from .reports.trajectory import drawings
 
         return report(self, lambda: drawings(self, self.trajectory).values())

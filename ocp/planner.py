@@ -9,28 +9,24 @@ from functools import partial
 from typing import Any
 
 from ..base.display import Displayed
-from ..base.errors import InputError
-from ..base.inputs import number
+from ..base.inputs import InputError, number
 from ..models.files import AnyRobot, as_robot
 from .nlp.rows import Mesh
 from .nlp.solver import Progress, Solver, check_progress
 from .nlp.waiting import heeding
 from .plan import Plan
-from .search.reference import with_its_reference
+from .search.reference import deviation_from, with_its_reference
 from .search.replanning import Replanner
 from .search.search import Search
-from .search.shortest_durations import Chosen, shortest_durations
-from .search.start import deviation_from
+from .search.shortest_durations import Chosen, PathTiming, shortest_durations
 from .search.stops_within import stopping_within
-from .search.time_law import PathTiming
 from .search.uncertain_robots import for_robots, judged
 from .stages import climb
-from .tasks.deviation import Deviation
 from .tasks.initial import Initial
-from .tasks.lay_out import lay_out
-from .tasks.measured import Measured
+from .tasks.lay_out import Measured, lay_out
 from .tasks.paths import AnyPath
 from .tasks.scenario import Scenario
+from .tasks.scheme import Deviation
 from .tasks.task import Task, read_task
 
 LEAST_SHARE = 1e-9  # of robots that must keep their limits, or that need not

@@ -13,20 +13,13 @@ from ..base.display import Displayed, tensions_over_time
 from ..solvers import Certificate
 from ..statics.robust import RobotShare, share_of_robots
 from .audits.audit import Audit
-from .audits.infeasible_spans import infeasible_spans
-from .audits.phase_summary import PhaseSummary, summaries
-from .audits.waypoint_distance import WaypointDistance, waypoint_distance
-from .tasks.deviation import Deviation
+from .audits.phase_summary import PhaseSummary, WaypointDistance, infeasible_spans, summaries, waypoint_distance
 from .tasks.paths import Motion
 from .tasks.scenario import Scenario
-from .tasks.status import MotionStatus
-from .warnings.cable_lengths import fixed_cables, short_cables
-from .warnings.inside_bodies import between_points, into_each_other, into_places
-from .warnings.instants import Instants
-from .warnings.long_turns import long_turns
-from .warnings.outside_frame import leaves_its_points, outside_frame
-from .warnings.slipped_units import slipped_units
-from .warnings.weak_formation import weak_formation
+from .tasks.scheme import Deviation
+from .tasks.task import MotionStatus
+from .warnings.positions import Instants, between_points, into_each_other, into_places, leaves_its_points, outside_frame
+from .warnings.values import fixed_cables, long_turns, short_cables, slipped_units, weak_formation
 
 if TYPE_CHECKING:
     from ..statics.stop_result import Stop

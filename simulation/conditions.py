@@ -8,8 +8,7 @@ import numpy as np
 from typing_extensions import override
 
 from ..base.display import Displayed, record
-from ..base.errors import InputError
-from ..base.inputs import finite_array, number, one_of, shown, whole_number
+from ..base.inputs import InputError, finite_array, number, one_of, shown, whole_number
 from ..control import Reference
 from ..control.noise import Noise
 from ..models import air

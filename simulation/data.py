@@ -11,9 +11,9 @@ from ..base.display import Displayed
 from ..base.text import quantity
 from ..control import ANSWERS, Command, Reference
 from ..control.controller import NOTHING, OTHERWISE
-from ..models.body import skeleton
 from ..models.points import placed
 from ..models.robot import Robot
+from ..models.shapes import skeleton
 from .conditions import Experiment
 
 TENSION_TOLERANCE = 1e-3  # of a cable's range: what its tension may be above t_max

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.errors import InputError
-from ..base.inputs import check_ending, file_path
+from ..base.inputs import InputError, check_ending, file_path
 from ..base.netcdf import Contents, Variable, save_netcdf
 from ..base.text import counted, quantity
 from ..control import ANSWERS, Controller

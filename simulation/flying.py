@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import InputError
-from ..base.inputs import shown
+from ..base.inputs import InputError, shown
 from ..control import ANSWERS, Command, Controller, Reference, State
 from ..control.controller import HOLD
 from ..core import sense

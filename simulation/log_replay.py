@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.display import Displayed, Fact
-from ..base.errors import InputError
-from ..base.inputs import check_ending, file_path, flag, number, one_of
+from ..base.inputs import InputError, check_ending, file_path, flag, number, one_of
 from ..base.netcdf import Contents, Variable, save_netcdf
 from ..base.text import counted, quantity, quantity_row
 from ..control.deviation import tolerance_of

@@ -13,9 +13,8 @@ from warnings import warn
 import numpy as np
 from typing_extensions import Unpack
 
-from ..base.errors import InputError
 from ..base.execution import Execution, ExecutionOptions
-from ..base.inputs import required, shown, whole_number, with_fields
+from ..base.inputs import InputError, required, shown, whole_number, with_fields
 from ..control import ComputedTorque, Controller, LengthControl, Reference
 from ..control.deviation import tolerance_of
 from ..control.noise import Noise

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..base.display import Fact, tensions_over_time
-from ..base.errors import InputError
-from ..base.inputs import required, shown
+from ..base.inputs import InputError, required, shown
 from ..base.netcdf import Contents, Variable
 from ..base.text import at_most, quantity
 from ..control import ANSWERS, Reference

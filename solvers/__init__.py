@@ -14,10 +14,9 @@ from .margin import Margin, capacity_margin
 from .methods.method import Method, Proposal
 from .problem import TensionProblem
 from .rate import limit_rate
-from .solution import TensionSolution
+from .solution import Status, TensionSolution
 from .solve import methods, solve
 from .standard_form import StandardForm
-from .status import Status
 
 __all__ = [
     "BatchSolution",

@@ -12,14 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import processors
 from ..base.display import Displayed, Fact
-from ..base.errors import InputError
-from ..base.inputs import leading, number, real_array, shown, whole_number
+from ..base.inputs import InputError, leading, number, real_array, shown, whole_number
 from ..base.text import quantity
 from ..core import CABLES, ROWS, solve_rows
 from .problem import Array, TensionProblem
-from .solution import TensionSolution
+from .solution import INVALID, STATUSES, UNSURE, Status, TensionSolution
 from .solve import solve
-from .status import INVALID, STATUSES, UNSURE, Status
 
 ROWS_WORTH_A_THREAD = 2000  # about a millisecond
 BACKENDS = LANES, ONE_BY_ONE = "lanes", "c"

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import InputError
-from ..base.inputs import shown, whole_number
+from ..base.inputs import InputError, shown, whole_number
 from .derivatives import derivatives
 from .problem import Array, TensionProblem
 from .solve import solve

@@ -16,8 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import InputError
-from ..base.inputs import required
+from ..base.inputs import InputError, required
 from .problem import Array, TensionProblem
 from .solution import TensionSolution
 

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.display import Displayed, record
-from ..base.errors import InputError
-from ..base.inputs import flag, real_array, whole_number
+from ..base.inputs import InputError, flag, real_array, whole_number
 from ..core import PROCESSOR, horizon_places, horizon_relative_to, horizon_size, horizon_solve
 from .problem import Array
 

@@ -8,8 +8,8 @@ import numpy as np
 from ..core import CABLES, ROWS, solve_rows
 from .batch import solve_batch
 from .problem import Array, TensionProblem
+from .solution import INFEASIBLE, INVALID, OPTIMAL, SINGULAR, UNSURE
 from .solve import solve
-from .status import INFEASIBLE, INVALID, OPTIMAL, SINGULAR, UNSURE
 
 RHO = 1e8  # weight of the squared wrench error in a soft solution, relative to the squared tensions
 # The same where carriers give what cables cannot. With more, cables that hardly turn the platform pull as hard as they

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.display import Displayed
-from ..base.errors import InputError
-from ..base.inputs import real_array, repeated
+from ..base.inputs import InputError, real_array, repeated
 from ..base.tolerances import CANCELLED, DOUBTFUL, FEASIBILITY, ROUNDING, WEIGHTS_APART
 
 Array = NDArray[np.float64]

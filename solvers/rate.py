@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import InputError
-from ..base.inputs import repeated, required, shown
+from ..base.inputs import InputError, repeated, required, shown
 from .problem import TensionProblem
 
 

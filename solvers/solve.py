@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy import empty
 
-from ..base.errors import InputError
-from ..base.inputs import shown
+from ..base.inputs import InputError, shown
 from ..core import solve_packed
 from .box_least_squares import project
 from .certificate import Certificate, certificate_along, sharpest
@@ -16,9 +15,8 @@ from .methods import METHODS
 from .methods.method import Method, Proposal
 from .methods.qp import ActiveSet
 from .problem import Array, TensionProblem
-from .solution import TensionSolution
+from .solution import INFEASIBLE, OPTIMAL, SINGULAR, STATUSES, TensionSolution
 from .standard_form import StandardForm, standard_forms
-from .status import INFEASIBLE, OPTIMAL, SINGULAR, STATUSES
 from .verify import verify
 
 _OPTIMAL = STATUSES[OPTIMAL]

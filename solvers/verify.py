@@ -11,8 +11,8 @@ from .exact_arithmetic import exact_optimum
 from .methods.method import Method, Proposal
 from .methods.numerics.linear_program import optimise
 from .problem import Array, TensionProblem, accepted_error
+from .solution import Status
 from .standard_form import StandardForm
-from .status import Status
 
 _EXACT = "at the edge of what the cables can give, or of rounding: solved in exact arithmetic"
 _ON_FACE = "at the edge of what the cables can give: a choice among the tensions that give the wrench there"

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import InputError
-from ..base.inputs import real_array
+from ..base.inputs import InputError, real_array
 from ..models.files import AnyRobot
 from ..models.part import LARGEST
 from ..models.robot import Robot
@@ -77,7 +76,7 @@ def pose_problem(
 
     Raises `InputError` if an argument has a wrong type, shape or value, or a cable has no direction.
     """
-    from ..models.motion import Motion
+    from ..models.arrays import Motion
 
     motion = Motion(pose, velocity, acceleration, carrier_pose, carrier_velocity, carrier_acceleration)
     for name, value in {**motion._asdict(), "wind": wind}.items():

@@ -30,8 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.display import record
-from ..base.errors import InputError
-from ..base.inputs import finite_array, real_array, required, shown, whole_number
+from ..base.inputs import InputError, finite_array, real_array, required, shown, whole_number
 from ..models.part import LARGEST
 from ..models.robot import Robot
 from ..models.uncertainty import Uncertainty

@@ -9,10 +9,10 @@ import numpy as np
 
 from ..base.inputs import printable
 from ..figures.scene import Scene, outlines_from
-from ..models.body import surface
 from ..models.dynamics import dynamics_of
 from ..models.points import placed
 from ..models.robot import Robot
+from ..models.shapes import surface
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.display import Displayed
-from ..base.errors import InputError
-from ..base.inputs import finite_array
+from ..base.inputs import InputError, finite_array
 from ..models.dynamics import dynamics_of
 from ..models.elasticity import frequency, whitened, whitening
 from ..models.files import AnyRobot, as_robot

@@ -17,7 +17,7 @@ from towline.models.carriers import Carrier, GroundCarrier
 from towline.models.parsing import json_schema, parse_yaml, to_yaml
 from towline.models.robot import Robot
 from towline.ocp import time_along
-from towline.ocp.reports.drawings import drawings
+from towline.ocp.reports.trajectory import drawings
 from towline.viewer.geometry import Geometry
 from towline.viewer.sliders import sliders
 

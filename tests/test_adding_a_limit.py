@@ -11,7 +11,7 @@ from towline.base.errors import InputError
 from towline.models import load
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.ocp.audits.audit import audit
-from towline.ocp.reports.drawings import limited
+from towline.ocp.reports.trajectory import limited
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
 from towline.viewer.replay import Replay

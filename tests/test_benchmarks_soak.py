@@ -8,8 +8,7 @@ import pytest
 
 from towline.benchmarks.harness import alternating, ratio, table
 
-from .soak import __main__ as soak
-from .soak import exactness
+from .soak import __main__ as soak, exactness
 
 
 def run(monkeypatch, *arguments):

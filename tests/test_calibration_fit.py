@@ -9,8 +9,14 @@ from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from towline.base.text import counted
-from towline.estimation.calibration import Measurements, calibrate, cross_validation, representative, starts
-from towline.estimation.calibration import model as model_module
+from towline.estimation.calibration import (
+    Measurements,
+    calibrate,
+    cross_validation,
+    model as model_module,
+    representative,
+    starts,
+)
 from towline.estimation.calibration.autocorrelation import information_of
 from towline.estimation.calibration.fit import fit
 from towline.estimation.calibration.geometry import length_of

@@ -13,8 +13,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from towline.base.errors import InputError
-from towline.estimation.calibration import Measurements, calibrate, outliers, solving, stretch
-from towline.estimation.calibration import representative as module
+from towline.estimation.calibration import Measurements, calibrate, outliers, representative as module, solving, stretch
 from towline.estimation.calibration.autocorrelation import information_of
 from towline.estimation.calibration.balance import Balance, FeltTensions
 from towline.estimation.calibration.cross_validation import compare

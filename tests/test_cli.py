@@ -15,8 +15,7 @@ from PIL import Image
 from towline.models import available, load
 from towline.models.library import FOLDER
 
-from .warm import TOWLINE
-from .warm import towline as run
+from .warm import TOWLINE, towline as run
 
 
 @pytest.fixture(scope="module")

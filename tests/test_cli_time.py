@@ -9,8 +9,7 @@ import pytest
 
 from towline.models import load
 from towline.models.parsing import parse_yaml
-from towline.ocp import Task, read_task
-from towline.ocp import plan as plan_motion
+from towline.ocp import Task, plan as plan_motion, read_task
 
 from .warm import towline as run
 

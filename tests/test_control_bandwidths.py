@@ -5,8 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from towline import InputError, load, plan, simulate
 from towline.control import ComputedTorque, FaultTolerant, Predictive

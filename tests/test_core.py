@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from towline import Dynamics, load
-from towline import core as extension
+from towline import Dynamics, core as extension, load
 from towline.base import tolerances
 from towline.solvers import TensionProblem, certify, solve
-from towline.solvers.status import STATUSES, UNSURE
+from towline.solvers.solution import STATUSES, UNSURE
 
 from .references import linear_program_status, optimality_error, support_value
 from .soak.exactness import awkward_problem

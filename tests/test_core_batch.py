@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from towline import core
-from towline.solvers.status import UNSURE
+from towline.solvers.solution import UNSURE
 
 from .c_programs import FLAGS, WITHOUT_LANES, program_of, require, sources_of, watched_objects
 from .soak.exactness import awkward_problem

@@ -6,8 +6,7 @@ from itertools import permutations, product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from towline import (
     Dynamics,
@@ -21,8 +20,7 @@ from towline import (
     plan,
     read_requirements,
 )
-from towline.layout import Free, run
-from towline.layout import search as searching
+from towline.layout import Free, run, search as searching
 from towline.layout.evaluation import Evaluation, rows_of
 from towline.layout.goal import Goal
 from towline.layout.impossibility import find_impossibility

@@ -12,7 +12,7 @@ from towline import Robot, available, load, solve_batch
 from towline.export.step.export import costs, mechanics, moving_carriers, step_files
 from towline.models import Dynamics
 from towline.models.tape_c import operations
-from towline.solvers.status import STATUSES
+from towline.solvers.solution import STATUSES
 
 from .soak import step as benchmark
 from .soak.step import robot_named

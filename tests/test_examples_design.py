@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from towline import Dynamics, TensionProblem, design, load, read_requirements, solve
-from towline.layout import run
-from towline.layout import search as searching
+from towline.layout import run, search as searching
 
 FOLDER = Path(__file__).parent.parent / "examples" / "design"
 PAGE = FOLDER.parents[1] / "docs" / "howto" / "design.md"

@@ -4,8 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from towline import Dynamics, InputError, load, plan, read_task, time_along
 from towline.models.parsing import parse_yaml, to_yaml

@@ -8,8 +8,7 @@ from matplotlib.colors import to_hex
 from matplotlib.text import Text
 
 from towline import Robot, available, load
-from towline.figures import robot as figure
-from towline.figures import style
+from towline.figures import robot as figure, style
 from towline.figures.scene import faces, outline
 from towline.figures.views import ABOVE, FRONT, SIDE, views_of
 from towline.statics.scene import scene_at

@@ -6,12 +6,11 @@ from math import comb
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from towline import core
 from towline.solvers import TensionProblem, capacity_margin
-from towline.solvers.margins import all_reserves, margins, reserves
+from towline.solvers.margin import all_reserves, margins, reserves
 
 from .c_programs import program_of, sources_of, watched_objects
 from .problems import geometric_matrix

@@ -6,8 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from towline.base.errors import InputError
-from towline.models import Dynamics, Robot, available, load
-from towline.models import rotation as symbolic_rotation
+from towline.models import Dynamics, Robot, available, load, rotation as symbolic_rotation
 
 GENERATOR_SEED = 20261121
 

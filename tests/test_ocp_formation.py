@@ -7,8 +7,7 @@ import numpy as np
 
 from towline.models import load
 from towline.ocp import plan
-from towline.ocp.nlp.formation import clear_formation
-from towline.ocp.nlp.guess import initial_guess
+from towline.ocp.nlp.guess import clear_formation, initial_guess
 from towline.ocp.result import Offers
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task

@@ -14,8 +14,8 @@ from towline.ocp import Planner, plan
 from towline.ocp.global_path.at_rest import AtRest
 from towline.ocp.global_path.clear_space import ClearSpace
 from towline.ocp.global_path.global_path import find_global_path, with_clear_ends
-from towline.ocp.global_path.need import guess_exceeds, is_open
 from towline.ocp.global_path.space import Space
+from towline.ocp.global_path.tree import guess_exceeds, is_open
 from towline.ocp.nlp.guess import usual_guess
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task

@@ -10,8 +10,8 @@ from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, plan
 from towline.ocp.limits import Limit
 from towline.ocp.proofs.durations import durations
-from towline.ocp.search import feasible_changes, other_plans, slower
-from towline.ocp.search.looser_limits import looser_limits
+from towline.ocp.search import feasible_changes, refinement, slower
+from towline.ocp.search.feasible_changes import looser_limits
 from towline.ocp.search.search import Search
 from towline.ocp.tasks import scenario, task_checks
 from towline.ocp.tasks.ends import between_fixed_values
@@ -292,7 +292,7 @@ def test_an_enclosed_end_has_a_way_without_the_wall_that_closes_it(monkeypatch):
     kept = [wall for wall in walls if repr(wall["name"]) not in offer.detail]
     assert offer.possible == len(kept) < len(walls)
     assert plan(robot, task | {"limits": {"keep_out": kept}}).feasible
-    monkeypatch.setattr(other_plans, "MOST_EFFORT", 0.0)
+    monkeypatch.setattr(refinement, "MOST_EFFORT", 0.0)
     none = feasible_changes.feasible_changes(search, laid_out, through, search.audit_motion(laid_out, through))
     assert not none.found
     assert none.cut_short

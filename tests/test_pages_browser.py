@@ -6,8 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from towline.figures import page as html
-from towline.figures import style
+from towline.figures import page as html, style
 from towline.figures.drawing import Drawing
 from towline.studies.accounts import files as accounts
 from towline.studies.accounts.claim import Account, Chapter, Claim, Paper, Verdict

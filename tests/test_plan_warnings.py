@@ -15,11 +15,8 @@ from towline.models import Dynamics
 from towline.models.diagnosis import diagnose
 from towline.ocp.tasks.paths import LinePath
 from towline.ocp.tasks.task import read_task
-from towline.ocp.warnings.cable_lengths import fixed_cables
-from towline.ocp.warnings.instants import Instants
-from towline.ocp.warnings.long_turns import long_turns
-from towline.ocp.warnings.slipped_units import slipped_units
-from towline.ocp.warnings.weak_formation import weak_formation
+from towline.ocp.warnings.positions import Instants
+from towline.ocp.warnings.values import fixed_cables, long_turns, slipped_units, weak_formation
 
 from .framed import framed
 from .told import told

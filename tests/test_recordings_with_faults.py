@@ -9,8 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from towline import calibrate, read_measurements
 from towline.base.errors import InputError
-from towline.estimation.calibration import Measurements, corrected
-from towline.estimation.calibration import left_out as module
+from towline.estimation.calibration import Measurements, corrected, left_out as module
 from towline.estimation.calibration.left_out import left_out
 from towline.estimation.calibration.plausibility import mistake
 from towline.estimation.logs.encoders import unrolled

@@ -14,7 +14,7 @@ from towline import Robot, Task, available, design, load, plan
 from towline.cli.main import COMMANDS, app
 from towline.control.controller import ANSWERS
 from towline.ocp import MotionStatus
-from towline.ocp.sweeps.row import FAILED
+from towline.ocp.sweeps.cases import FAILED
 from towline.solvers import Status
 from towline.studies.accounts.claim import Verdict
 
@@ -159,7 +159,7 @@ def test_every_row_of_reports_is_explained():
 
 
 ROWS = {  # the modules that write the reports of a section
-    "Plans": [f"ocp/reports/{name}.py" for name in ("ideas", "motion_facts", "reasons", "report")],
+    "Plans": [f"ocp/reports/{name}.py" for name in ("reasons", "report")],
     "Simulations": ["simulation/simulation.py", "simulation/flights.py"],
     "Designs": ["layout/result.py", "layout/impossibility.py"],
     "Replays": ["simulation/log_replay.py"],

@@ -8,10 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from towline.models import Dynamics, load
 from towline.studies.accounts.claim import Verdict
-from towline.studies.towing import equations as towing_equations
-from towline.studies.towing import loop as towing_loop
-from towline.studies.towing import ranges as towing_ranges
-from towline.studies.towing import tensions as towing_tensions
+from towline.studies.towing import (
+    equations as towing_equations,
+    loop as towing_loop,
+    ranges as towing_ranges,
+    tensions as towing_tensions,
+)
 from towline.studies.towing.workspace import in_prism
 
 

@@ -11,9 +11,17 @@ from scipy.spatial.transform import Rotation
 
 from towline.models import load
 from towline.studies.accounts.claim import Verdict
-from towline.studies.flying import balance, element, every_pairing, references, rotations, structure, vibration
-from towline.studies.flying import procedure as steps_of_f
-from towline.studies.flying import radius as largest
+from towline.studies.flying import (
+    balance,
+    element,
+    every_pairing,
+    procedure as steps_of_f,
+    radius as largest,
+    references,
+    rotations,
+    structure,
+    vibration,
+)
 from towline.studies.towing import equations, loop, ranges, tensions
 
 from .legible import check_grey, check_size, check_texts, renderer_of

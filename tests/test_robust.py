@@ -11,7 +11,7 @@ from towline import Dynamics, Planner, Robot, load, plan, time_along
 from towline.base.errors import InputError
 from towline.models import Uncertainty
 from towline.models.mechanics import derivatives
-from towline.ocp.proofs.too_uncertain import too_uncertain
+from towline.ocp.search.uncertain_robots import too_uncertain
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
 from towline.statics.robust import _inverse, ellipsoid_factor, motion_factor, share_of_robots, spread

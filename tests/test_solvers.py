@@ -6,8 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
 from towline.base.errors import InputError
 from towline.solvers import Status, TensionProblem, certify, methods, solve, solve_batch

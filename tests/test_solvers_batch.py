@@ -4,8 +4,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from towline.base.errors import InputError, SolverError
 from towline.solvers import Status, TensionProblem, certify, solve, solve_batch

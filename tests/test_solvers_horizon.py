@@ -9,8 +9,7 @@ import daqp
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 from scipy.linalg import block_diag
 
 from towline.base.errors import InputError

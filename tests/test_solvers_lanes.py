@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from towline.base.errors import InputError
-from towline.solvers import Status, TensionProblem, solve
-from towline.solvers import solve_batch as solve_problems
+from towline.solvers import Status, TensionProblem, solve, solve_batch as solve_problems
 
 from .problems import random_feasible, random_infeasible
 

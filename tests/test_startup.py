@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from towline.base.imported_late import imported_late
+from towline.ocp.timing.toppra_law import imported_late
 
 TASK = """\
 name: circle

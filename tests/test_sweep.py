@@ -23,11 +23,10 @@ from towline.base.errors import InputError
 from towline.cli.main import app
 from towline.models.parsing import to_yaml
 from towline.models.uncertainty import Uncertainty
-from towline.ocp.sweeps import row as row_module
+from towline.ocp.sweeps import cases as row_module
 from towline.ocp.sweeps.axis import read_axes, read_option
-from towline.ocp.sweeps.cases import Cases
+from towline.ocp.sweeps.cases import Cases, Row
 from towline.ocp.sweeps.result import Sweep
-from towline.ocp.sweeps.row import Row
 
 TOWLINE = Path(sys.executable).with_name("towline")
 GRAVITY = 9.81

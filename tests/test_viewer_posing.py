@@ -20,7 +20,7 @@ from towline.viewer.posing import at_rest_with, home_at_rest, opening_pose
 from towline.viewer.sliders import sliders, whole_steps
 from towline.viewer.stage import Stage
 from towline.workspace import Condition, Places, StaticEquilibrium, sample, save
-from towline.workspace.nearest import nearest_feasible
+from towline.workspace.region import nearest_feasible
 from towline.workspace.surface import surface
 
 from .viewer_wire import CAMERA, Wire

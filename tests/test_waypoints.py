@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from towline import load, plan, read_task
 from towline.base.errors import InputError
 from towline.ocp.tasks.paths import LinePath, WaypointPath
-from towline.ocp.warnings.outside_frame import leaves_its_points
+from towline.ocp.warnings.positions import leaves_its_points
 
 LISTS = 60
 SHARES = np.linspace(0.0, 1.0, 2001)

@@ -19,8 +19,8 @@ from ..figures.robot import box_edges
 from ..figures.scene import faces
 from ..figures.tension_colours import NO_TENSION, place, rgb, shades
 from ..models import Robot
-from ..models.body import surface
 from ..models.record import record_of
+from ..models.shapes import surface
 from . import labels
 from .geometry import posts, rotors
 from .posing import few_cables, opening_pose

@@ -16,8 +16,7 @@ from ..base.errors import InputError, TowlineError
 from ..figures.animation import FASTEST, draw, timing
 from ..models import available
 from ..statics.scene import scene
-from ..workspace.surface import Surface
-from ..workspace.surface import surface as surface_of
+from ..workspace.surface import Surface, surface as surface_of
 from . import labels
 from .frames import Frames
 from .geometry import FARTHEST

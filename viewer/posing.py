@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from ..base.errors import InputError, TowlineError
 from ..models import Dynamics, Robot, points
-from ..statics.rest_near import rest_near
+from ..statics.equilibria import rest_near
 from ..workspace import StaticEquilibrium
-from ..workspace.nearest import nearest_feasible
+from ..workspace.region import nearest_feasible
 from .frames import Frames
 from .geometry import Geometry
 from .labels import link

@@ -7,8 +7,7 @@ from functools import cached_property, partial
 import numpy as np
 import xarray as xr
 
-from ..base.errors import InputError
-from ..base.inputs import printable
+from ..base.inputs import InputError, printable
 from ..base.netcdf import numbers_of
 from ..figures.scene import outlines_from
 from ..models import Robot

@@ -12,8 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.errors import InputError
-from ..base.inputs import file_path, required, shown, whole_number
+from ..base.inputs import InputError, file_path, required, shown, whole_number
 from ..base.quiet import quiet
 from ..base.writing import whole_file
 from ..figures.perspective import ALONG

@@ -16,7 +16,7 @@ from ..figures.perspective import ALONG
 from ..figures.robot import box_edges, drawn_ends
 from ..figures.scene import faces
 from ..figures.tension_colours import place, rgb, shades
-from ..models.body import surface
+from ..models.shapes import surface
 from . import labels
 from .geometry import FIELD_OF_VIEW, Extent, posts, rotors, sheaves
 from .snapshot import Snapshot, arrow

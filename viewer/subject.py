@@ -10,8 +10,7 @@ import xarray as xr
 
 from ..base.declared import check_zarr
 from ..base.display import Displayed
-from ..base.errors import InputError
-from ..base.inputs import file_path, printable, required, shown
+from ..base.inputs import InputError, file_path, printable, required, shown
 from ..base.netcdf import load_netcdf, numbers_of
 from ..base.text import quantity
 from ..figures import style

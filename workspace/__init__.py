@@ -5,12 +5,11 @@ Conditions can be joined by & and |. `sample` evaluates them, `boundary` compute
 
 from . import conditions
 from .boundary_mesh import boundary
-from .condition import AllOf, AnyOf, Condition, TensionCondition, condition_from
+from .condition import AllOf, AnyOf, Condition, Places, TensionCondition, condition_from
 from .conditions import *  # noqa: F403  the only list of them is there
 from .dataset import save
 from .metrics import METRICS, metric_values
 from .picture import draw
-from .places import Places
 from .region import Region
 from .run import sample
 

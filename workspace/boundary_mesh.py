@@ -7,13 +7,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.display import Displayed
-from ..base.errors import InputError
-from ..base.inputs import finite_array, required, whole_number
+from ..base.inputs import InputError, finite_array, required, whole_number
 from ..base.writing import whole_file
 from ..models.files import AnyRobot, as_robot
-from ..models.stl import HEADER, RECORD
-from .condition import Condition
-from .places import Places
+from ..models.polyhedron import HEADER, RECORD
+from .condition import Condition, Places
 
 MOST_CELLS = 512  # along an edge: 10^8 poses at once
 

@@ -12,13 +12,12 @@ from typing import Annotated, Any, ClassVar, Literal, get_args
 import numpy as np
 from pydantic import BeforeValidator, Field, SerializeAsAny
 
-from ..base.errors import InputError
-from ..base.inputs import number, required, shown
+from ..base.inputs import InputError, number, required, shown
 from ..models import Robot
 from ..models.parsing import validate
 from ..models.part import Part, Share, optional
 from .feasibility import too_few_cables
-from .places import Places, check_places
+from .places import Places as Places, check_places as check_places  # for classes of conditions
 
 LEAST_SHARE = 1e-9  # of robots that must fulfil a condition, or that need not
 

@@ -8,8 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..base.errors import InputError
-from ..base.inputs import required
+from ..base.inputs import InputError, required
 from ..models import Robot
 from ..models.dynamics import dynamics_of
 from ..solvers import solve_batch

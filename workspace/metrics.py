@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.errors import InputError
-from ..base.inputs import one_of, shown
+from ..base.inputs import InputError, one_of, shown
 from ..models import Robot
 from ..models.dynamics import dynamics_of
 from ..models.points import anchors, attachments

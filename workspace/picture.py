@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..base.errors import InputError
-from ..base.inputs import required, shown
+from ..base.inputs import InputError, required, shown
 from ..models.files import AnyRobot, as_robot
 from .metrics import METRICS
 

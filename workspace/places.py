@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.display import Displayed
-from ..base.errors import InputError
-from ..base.inputs import real_array, required, shown
+from ..base.inputs import InputError, real_array, required, shown
 from ..models import Robot
 
 

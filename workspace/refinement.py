@@ -9,8 +9,7 @@ from itertools import product
 
 import numpy as np
 
-from ..base.errors import InputError
-from ..base.inputs import number, whole_number
+from ..base.inputs import InputError, number, whole_number
 from .domain import Domain
 from .sampling import cells_of
 

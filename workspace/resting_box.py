@@ -6,8 +6,8 @@ import numpy as np
 
 from ..models import Robot
 from ..models.diagnosis import too_weak
+from .condition import Places
 from .feasibility import feasible, rest_wrench
-from .places import Places
 from .region import room, surrounding_box
 
 ROUNDING = 1e-9  # [m]

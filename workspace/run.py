@@ -13,15 +13,13 @@ import numpy as np
 from typing_extensions import Unpack
 
 from ..base.checkpoint import Checkpoint, Kind
-from ..base.errors import InputError
 from ..base.execution import Execution, ExecutionOptions, Progress, Workers, started
-from ..base.inputs import one_of, required, shown, whole_number, with_fields
+from ..base.inputs import InputError, one_of, required, shown, whole_number, with_fields
 from ..base.version import __version__
 from ..models import Robot
 from ..models.files import AnyRobot, as_robot
 from .condition import Condition, condition_from, for_robots
-from .counts import Counter, Counts
-from .dataset import dataset
+from .dataset import Counter, Counts, dataset
 from .domain import Domain
 from .metrics import metric_names, metric_values
 from .refinement import Refinement

@@ -11,9 +11,9 @@ import numpy as np
 from ..base.display import Displayed
 from ..models import Robot
 from .boundary_mesh import Mesh, boundary_of_values
+from .condition import Places
 from .conditions.margin import Margin
 from .domain import Domain
-from .places import Places
 from .region import Region
 
 if TYPE_CHECKING:

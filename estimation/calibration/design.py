@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...base.errors import InputError
-from ...base.inputs import flag, real_array, shown, whole_number
+from ...base.inputs import InputError, flag, real_array, shown, whole_number
 from ...models.files import AnyRobot, as_robot
 from ...models.robot import Robot
 from ..logs.measurements import Measurements

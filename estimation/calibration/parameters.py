@@ -19,8 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...base.display import Displayed
-from ...base.errors import InputError
-from ...base.inputs import number, shown
+from ...base.inputs import InputError, number, shown
 from ...models import points
 from ...models.parameters import ENCODER
 from ...models.robot import Robot

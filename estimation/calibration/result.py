@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base.display import BLUE, GREY, Displayed, picture
-from ...base.errors import InputError
-from ...base.inputs import real_array
+from ...base.inputs import InputError, real_array
 from ...base.text import counted, quantity
 from ...models import points
 from ...models.part import LARGEST

@@ -2,8 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from ...base.errors import InputError
-from ...base.inputs import flag
+from ...base.inputs import InputError, flag
 from ...models.files import AnyRobot, as_robot
 from ..logs.measurements import Measurements, check_measurements, tracked
 from .calibration import Calibration

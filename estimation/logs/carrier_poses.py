@@ -13,8 +13,7 @@ from .measurements import Measurements
 from .recording import Field, Recording, Samples
 from .smoothing import FEWEST, Polynomials, continuous, within
 from .streams import Reader, at_times
-from .thrust_gains import notes as notes_of_gains
-from .thrust_gains import thrust_gains
+from .thrust_gains import notes as notes_of_gains, thrust_gains
 
 MOST_TILT = 1.1 * np.pi
 LEAST_THRUST, MOST_THRUST = 0.6, 3.0  # times the weight, of thrusts in newtons

@@ -9,8 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from pydantic import Field as Key
 
-from ...base.errors import InputError
-from ...base.inputs import file_path
+from ...base.inputs import InputError, file_path
 from ...models.parsing import read_yaml
 from ...models.part import COORDINATES, Part
 from ...models.robot import Robot

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from ...base.display import Displayed
-from ...base.errors import InputError
-from ...base.inputs import file_path, number, one_of, real_array, required, shown
+from ...base.inputs import InputError, file_path, number, one_of, real_array, required, shown
 from ...base.netcdf import Contents, Variable, save_netcdf
 from ...models import points
 from ...models.part import COORDINATES, LARGEST

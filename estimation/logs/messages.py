@@ -156,8 +156,7 @@ def _until_cut(messages: Iterator[Message], notes: list[str]) -> Iterator[Messag
 def _mcap(path: Path, wanted: set[str] | None) -> Iterator[Message]:
     try:
         from mcap.exceptions import EndOfFile, RecordLengthLimitExceeded
-        from mcap.records import Channel, Chunk, Schema
-        from mcap.records import Message as Record
+        from mcap.records import Channel, Chunk, Message as Record, Schema
         from mcap.stream_reader import StreamReader, breakup_chunk
     except ImportError:
         raise InputError(f"is MCAP, for which the extra logs must be installed: {INSTALL}") from None

@@ -11,8 +11,7 @@ import numpy as np
 
 from ...base.csv_columns import LENGTHS, TIMES, read_columns
 from ...base.declared import check_hdf5, check_heaps
-from ...base.errors import InputError
-from ...base.inputs import file_path, printable
+from ...base.inputs import InputError, file_path, printable
 from ...base.netcdf import check_units
 from ...base.reading import check_file, read_bytes
 from ...base.text import quantity

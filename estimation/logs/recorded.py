@@ -22,8 +22,7 @@ from .mapping import Fields, carrier_fields, command_fields, read_map
 from .reading import Log, Paths, read_log
 from .recording import Field
 from .streams import Reader
-from .thrust_gains import notes as notes_of_gains
-from .thrust_gains import thrust_gains
+from .thrust_gains import notes as notes_of_gains, thrust_gains
 
 TO_COMPARE = "poses, or tensions or lengths that do not drive the plant"
 

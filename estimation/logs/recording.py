@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...base.errors import InputError
-from ...base.inputs import printable
+from ...base.inputs import InputError, printable
 from .names import UNITS, unit_of
 
 GAP = 5.0  # median times between samples

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base.display import Displayed, record
-from ...base.errors import InputError
-from ...base.inputs import finite_array, number, real_array, shown
+from ...base.inputs import InputError, finite_array, number, real_array, shown
 from ...core import lines
 from ...models import points
 from ...models.files import AnyRobot, as_robot

@@ -6,8 +6,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...base.errors import InputError
-from ...base.inputs import leading, repeated, shown
+from ...base.inputs import InputError, leading, repeated, shown
 from ...base.text import counted
 from ...core import extent, one_pose_from_lengths
 from ...models import points
@@ -15,8 +14,7 @@ from ...models.batch import as_array
 from ...models.files import AnyRobot, as_robot
 from ...models.part import LARGEST
 from ...models.robot import Robot
-from ...statics.equilibria import Equilibrium, equilibria
-from ...statics.rest_near import rests_near, sensitivity
+from ...statics.equilibria import Equilibrium, equilibria, rests_near, sensitivity
 from .estimate import PoseEstimate, moved, unbounded
 from .residual_tests import length_errors
 from .search import Problem, estimates, problem_of

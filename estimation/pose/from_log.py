@@ -297,8 +297,7 @@ def _block(robot: Robot, measured: Measurements, weights: np.ndarray) -> tuple[n
     """
     from ..calibration.hanging import without_slack
     from ..calibration.normal_equations import pose_covariances, pose_covariances_by_file
-    from ..calibration.solving import lengths_of as lengths_left
-    from ..calibration.solving import model_of
+    from ..calibration.solving import lengths_of as lengths_left, model_of
     from ..calibration.starts import fit_from
 
     model = model_of(robot, measured, (), {})

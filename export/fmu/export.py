@@ -17,8 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ...base.errors import InputError
-from ...base.inputs import check_ending, file_path, one_of, printable
+from ...base.inputs import InputError, check_ending, file_path, one_of, printable
 from ...base.version import __version__
 from ...base.writing import check_writable, whole_file
 from ...control.computed_torque import ComputedTorque

@@ -20,8 +20,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ...base.display import Displayed
-from ...base.errors import InputError
-from ...base.inputs import HUGE, TINY, number, one_of, whole_number
+from ...base.inputs import HUGE, TINY, InputError, number, one_of, whole_number
 from ..batch import as_array
 from ..dynamics import dynamics_of
 from ..points import rotations

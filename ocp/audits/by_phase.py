@@ -11,9 +11,9 @@ from typing_extensions import override
 
 from ...solvers import Certificate, certify
 from ...statics.distribution import wrench_problem
+from ..tasks.lay_out_phases import end_tensions, largest_support, support_forces
 from ..tasks.paths import Motion
-from ..tasks.phases import LaidPhase
-from ..tasks.resting import end_tensions, largest_support, support_forces
+from ..tasks.phase import LaidPhase
 from ..tasks.scenario import Scenario
 from .tensions import AuditedTensions, Distribution
 

@@ -16,9 +16,9 @@ from ...models.batch import in_blocks
 from ..limits.distance import Distance
 from ..limits.limits import Separating, motions
 from ..tasks.paths import Motion
-from .curvature import is_jump, leaves
 from .excess import Excess
 from .instants import Instants
+from .peaks import is_jump, leaves
 
 UNDECIDED = 0.05  # of a limit's tolerance: less than that beside it is not looked for
 DEEPEST = 0.99  # of the largest excess is found

@@ -8,7 +8,7 @@ import numpy as np
 from ...base.display import Displayed
 from ...base.text import quantity
 from ..limits import Limit
-from ..limits.bodies import WITHIN
+from ..limits.places import WITHIN
 
 TENSIONS = "tensions"  # the limit of an audit that finds no tensions for the wrench
 

@@ -25,15 +25,14 @@ from ...base.display import Displayed
 from ...base.text import quantity
 from ..nlp.guess import formation_guess, guess_through, usual_guess
 from ..search.search import Search
-from ..tasks.deviation import Deviation
 from ..tasks.ends import carrier_ends, fixed_values
-from ..tasks.paths.rest_to_rest import rest_to_rest
+from ..tasks.paths.line import rest_to_rest
 from ..tasks.scenario import ATTITUDE, Scenario
+from ..tasks.scheme import Deviation
 from .at_rest import AtRest
 from .clear_space import FORMATIONS, ClearSpace, grown
-from .need import STILL, guess_exceeds, is_open, limit_name
 from .space import Space
-from .tree import connect
+from .tree import STILL, connect, guess_exceeds, is_open, limit_name
 
 RESERVES = (0.02, 0.004)  # of the robot's size, in the order in which they are tried
 MOST_RESERVE = 0.05  # [m]

@@ -20,7 +20,7 @@ from numpy.random import Generator
 
 from ...base.display import Displayed
 from ..tasks.ends import carrier_ends, fixed_values
-from ..tasks.paths.rest_to_rest import rest_to_rest
+from ..tasks.paths.line import rest_to_rest
 from ..tasks.scenario import ATTITUDE, POSITION, Scenario
 
 TIMES = 101  # at which what is given is evaluated, from start to end

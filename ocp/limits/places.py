@@ -1,16 +1,22 @@
-"""Limits of distances from keep-out regions for platform, carriers and cables.
+"""Limits of distances of platform, bodies that move with it, carriers and cables: from regions, the floor, in a room.
 
 A region that moves with the platform is its body, and its limits have separate names.
+
+Two bodies are apart if no edge of one meets the other, and their distance is the least distance of the edges of each
+from the other. Bodies with the same skeleton but round edges are nearer by their radii.
 """
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
 from typing_extensions import override
 
-from ...models import Robot
+from ...models import Robot, kinematics
+from ...models.part import Box
+from ...models.shapes import Shape, Skeleton, skeleton
 from .cables import names
 from .clearance import Place, cable_outside, point_outside
 from .distance import Distance, Pair
@@ -113,3 +119,91 @@ class CablesOutside(Outside):
         anchors = self._points(state, state.anchors)
         ends = ca.SX(ca.DM(state.robot.attachments.T)) if self._riding else state.attachments
         return [Pair(ca.horzcat(ends[:, i], anchors[:, i]), ca.SX(3, 0)) for i in range(state.robot.m)]
+
+
+PLATFORM, LOAD = "platform's body", "load's body"  # in texts
+WITHIN = " within "  # in texts, between a body and a side of its room
+PLACES = (1 / 3, 2 / 3, 1.0)  # on the way from one instant to the next: so far apart a body cannot jump over a region
+
+
+class BodyOutside(Outside):
+    """Keep a body out of a region, by the edges of one of both and the whole of the other."""
+
+    name, per_metre = "keep_out", 1.0  # of the region `riding` on the platform too: all corners of the body count
+
+    def __init__(self, whole: Shape, moving: Skeleton, whose: str, called: str, riding: bool, least: float):
+        super().__init__(whole, called, riding, least)
+        self.per_metre, self._moving = 1.0, moving
+        self.labels = (whose,) * len(moving.parts)
+
+    @override
+    def pairs(self, state: State) -> list[Pair]:
+        parts = (np.ascontiguousarray(part) for part in self._moving.parts)
+        if self._riding:
+            ends = (state.on_platform(ca.SX(ca.DM(part.T))) for part in parts)
+        else:
+            ends = (kinematics.transform(state.platform.pose, part) for part in parts)
+        return [Pair(end, ca.SX(3, 0)) for end in ends]
+
+    @override
+    def apart(self, pair: Pair) -> ca.SX:
+        return super().apart(pair) - self._moving.radius
+
+    @override
+    def on_the_way(self, first: State, second: State) -> ca.SX:
+        """Return the values at a few places of the way, which is no edge of a body itself."""
+        poses = [first.platform.pose + share * (second.platform.pose - first.platform.pose) for share in PLACES]
+        states = (replace(first, platform=first.platform._replace(pose=pose)) for pose in poses)
+        return ca.vertcat(*(self.values(state) for state in states))
+
+
+def body_outside(body: Shape, whose: str, place: Place, called: str, least: float) -> Iterator[Distance]:
+    """Yield the limits that keep a body in the platform's frame out of a region in {G}, by `least` [m]."""
+    own, its = skeleton(body), skeleton(place)
+    if its.solid or not own.solid:
+        yield BodyOutside(place, own, whose, called, False, least)
+    if own.solid:
+        yield BodyOutside(body, its, whose, called, True, least)
+
+
+class Inside(Distance):
+    """Keep points of the platform's frame, and what is within a radius of them, on one side of a plane in {G}."""
+
+    per_metre = 1.0
+
+    def __init__(self, name: str, points: np.ndarray, radius: float, whose: str, axis: int, sign: float, bound: float):
+        self.name, self.low = name, 0.0
+        self._points, self._radius, self._axis, self._sign, self._bound = points, radius, axis, sign, bound
+        self.labels = (whose,) * len(points)
+        side = "largest" if sign < 0 else "smallest"
+        self._called = "the floor" if name == "floor" else f"the {side} {'xyz'[axis]} of the room"
+
+    @override
+    def about(self, index: int) -> str:
+        return f"{self.labels[index]}{WITHIN}{self._called}"
+
+    @property
+    @override
+    def title(self) -> str:
+        return f"{self.name}, distance from {self._called}"
+
+    @override
+    def pairs(self, state: State) -> list[Pair]:
+        points = kinematics.transform(state.platform.pose, self._points)
+        return [Pair(point, ca.SX(3, 0)) for point in ca.horzsplit(points)]
+
+    @override
+    def apart(self, pair: Pair) -> ca.SX:
+        return self._sign * (pair.points[self._axis] - self._bound) - self._radius
+
+
+def inside_room(
+    points: np.ndarray, radius: float, whose: str, floor: float | None, room: Box | None
+) -> Iterator[Distance]:
+    """Yield the limits that keep points (k, 3) of the platform's frame above a floor [m] and in a room."""
+    if floor is not None:
+        yield Inside("floor", points, radius, whose, 2, 1.0, floor)
+    if room is not None:
+        for axis, pair in enumerate(zip(room.min, room.max, strict=True)):
+            for sign, bound in zip((1.0, -1.0), pair, strict=True):
+                yield Inside("workspace_box", points, radius, whose, axis, sign, bound)

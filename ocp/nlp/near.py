@@ -11,10 +11,10 @@ import numpy as np
 
 from ...base.display import Displayed
 from ..limits import Limit
-from ..limits.bodies import Inside
 from ..limits.limits import Limits
-from ..tasks.deviation import Deviation
+from ..limits.places import Inside
 from ..tasks.scenario import Scenario
+from ..tasks.scheme import Deviation
 
 BEND = 0.25  # of what a point moves in an interval: more than an arc is away from its chord
 

@@ -8,7 +8,7 @@ duration T too where the task leaves it free:
           (q, v)_{k+1} = integral of the acceleration's polynomial      (`scheme`, `spline`)
           t_min + margin <= t_k <= t_max - margin
           the same two for tensions of their own in each decisive wind of a box    (`wind_set`)
-          n_k >= 0, platform at rest on its path                        on the ground, else n_k = 0 (`tasks.phases`)
+          n_k >= 0, platform at rest on its path                        on the ground, else n_k = 0 (`tasks.phase`)
           the limits of `limits`                                        at every point
           their slopes lead inside where a fixed end is on one          (`leaving`)
           tube, reach, speed, tilt, acceleration at the Bernstein points: so they hold between points too
@@ -29,18 +29,15 @@ import numpy as np
 from ...base.display import Displayed
 from ..limits import Limit
 from ..tasks import bernstein
-from ..tasks.deviation import Deviation
 from ..tasks.ends import carrier_ends, fixed_values, platform_ends
-from ..tasks.resting import known_tensions
+from ..tasks.lay_out_phases import known_tensions
 from ..tasks.scenario import ATTITUDE, START_BAND, Scenario
-from .derivatives import Block, Columns, Mapped, derivatives
-from .grid import Grid, passed
+from ..tasks.scheme import Deviation
+from .derivatives import Block, Columns, Mapped, Part, derivatives
 from .held import eased, held_wrench
 from .interval import points
-from .layout import DURATION, MARGIN, Layout
 from .near import Near, has_places, parts
-from .part import Part
-from .rows import MANY, Mesh, Row, Tightening, stretch
+from .rows import DURATION, MANY, MARGIN, Grid, Layout, Mesh, Row, Tightening, passed, stretch
 from .stages import Stages, reference_motions
 
 LEGS = 0.3, 3.0  # times its duration in the motion before: what one of a leg may be

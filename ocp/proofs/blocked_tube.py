@@ -12,13 +12,11 @@ import casadi as ca
 import numpy as np
 
 from ...base.text import quantity_row
-from ...models.body import skeleton
 from ...models.points import placed
-from ...models.shapes import Block, Shape
+from ...models.shapes import Block, Shape, skeleton
 from ..audits.excess import Excess
-from ..limits.bodies import PLATFORM
 from ..limits.clearance import point_outside
-from ..limits.places import PlatformOutside
+from ..limits.places import PLATFORM, PlatformOutside
 from ..tasks.scenario import Scenario
 
 INSTANTS = 1001  # at least

@@ -24,12 +24,10 @@ from ..tasks.ends import AT_REST, fixed_values
 from ..tasks.paths import Motion
 from ..tasks.scenario import ATTITUDE, Scenario
 from .blocked_tube import blocked_tube
-from .no_attitude import CERTAIN, no_attitude
+from .no_attitude import CERTAIN, no_attitude, out_of_reach
 from .no_cycle import no_cycle
-from .out_of_reach import out_of_reach
 from .too_fast import too_fast
-from .too_heavy import too_heavy
-from .too_weak_carriers import OF_DURATION, too_weak_carriers
+from .too_heavy import OF_DURATION, too_heavy, too_weak_carriers
 
 PLACES = 41  # along the path
 GIVEN, NEAR, FREE = range(3)  # of a value: no freedom, freedom inside the tube, chosen by the planner

@@ -18,7 +18,7 @@ from ..limits.cables import CableAcceleration, CableSpeed
 from ..limits.carriers import CarrierAcceleration, CarrierSpeed
 from ..limits.platform import PlatformAcceleration, PlatformSpeed, ZoneSpeed
 from ..tasks.scenario import Scenario
-from .too_weak_carriers import OF_DURATION, TINY, carriers_of, strongest
+from .too_heavy import OF_DURATION, TINY, carriers_of, strongest
 
 CERTAIN = 1e-6  # of the duration
 

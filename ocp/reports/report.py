@@ -10,11 +10,9 @@ from ...figures.drawing import Drawing
 from ...figures.report import Report, Section, Table
 from ...models.parsing import to_yaml
 from ..result import PlanData, Relaxed
-from ..tasks.phases import SAME_TIME
+from ..tasks.phase import SAME_TIME
 from ..timing.timed_task import can_be_timed
-from .ideas import ideas, units
-from .motion_facts import motion_facts, wind
-from .reasons import exceeded, in_phase, reasons, up
+from .reasons import exceeded, ideas, in_phase, motion_facts, reasons, units, up, wind
 
 WORTH_A_NUMBER = 1e-3  # [N], of a margin
 RESOLVED = 1e-3  # [mm, mrad]: a smaller error of a simulation is rounding

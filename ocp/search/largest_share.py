@@ -18,7 +18,7 @@ from ..tasks.lay_out import with_task
 from ..tasks.paths import AnyPath
 from ..tasks.scenario import Scenario
 from ..tasks.wind_set import possible_winds_at
-from .other_plans import planned, rounded
+from .refinement import planned, rounded
 from .search import Search
 
 INSTANTS = 120  # at which tensions must exist before a motion is audited

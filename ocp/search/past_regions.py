@@ -11,7 +11,6 @@ from ...models.part import Box
 from ..audits.audit import Audit
 from ..global_path.at_rest import AtRest
 from ..global_path.global_path import find_global_path
-from ..global_path.shortest_shifts import shortest_shifts
 from ..global_path.space import Space
 from ..plan import Plan
 from ..proofs.durations import durations
@@ -22,7 +21,8 @@ from ..tasks.paths import FeedPath, LinePath, WaypointPath
 from ..tasks.scenario import POSITION, Scenario
 from ..tasks.task_limits import OF_BODY
 from .largest_share import Change, Variation, along, by_programs, exceeds
-from .other_plans import planned, rounded
+from .other_paths import shortest_shifts
+from .refinement import planned, rounded
 from .search import Search
 from .slower import other_duration
 

@@ -15,9 +15,9 @@ from ..result import Relaxed
 from ..tasks.lay_out import with_task
 from ..tasks.paths import CirclePath, FeedPath, RestPath, SamplePath, SequencePath, WaypointPath
 from ..tasks.scenario import Scenario
-from ..tasks.status import MotionStatus
+from ..tasks.task import MotionStatus
 from .largest_share import ORDERS, Change, Variation, along, at_ease, largest_share
-from .other_plans import planned, rounded, solved
+from .refinement import planned, rounded, solved
 from .search import Search
 
 LONGER = 1.002  # than the shortest duration: between the places that were checked slightly more can be needed

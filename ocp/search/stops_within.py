@@ -21,12 +21,12 @@ from ..audits.audit import audit
 from ..audits.excess import Excess
 from ..plan import Plan
 from ..result import Offers, PlannerStep, Relaxed
-from ..tasks.deviation import Deviation
 from ..tasks.lay_out import with_task
 from ..tasks.paths import TimedPath
 from ..tasks.scenario import Scenario
-from ..tasks.status import MotionStatus
-from .other_plans import planned, rounded
+from ..tasks.scheme import Deviation
+from ..tasks.task import MotionStatus
+from .refinement import planned, rounded
 from .search import Search
 
 LEAST_PERIOD, INSTANTS = 0.02, 200  # [s], from one stop's beginning to the next one's; and how many at most

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...base.display import Displayed
-from ...base.errors import InputError
-from ...base.inputs import shown
+from ...base.inputs import InputError, shown
 from ...models.parsing import parse_yaml
 from ...models.part import Part
 

@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.display import Displayed, Fact
-from ...base.errors import InputError
-from ...base.inputs import file_path, printable, whole_number
+from ...base.inputs import InputError, file_path, printable, whole_number
 from ...base.netcdf import Contents, Variable, save_netcdf
 from ...base.text import column, quantity
 from ...base.version import __version__
@@ -29,10 +28,9 @@ from ...figures.report import Report, Reported, Section, Table
 from ...models.parsing import to_yaml
 from ..plan import Plan
 from ..planner import plan
-from ..tasks.status import MotionStatus
+from ..tasks.task import MotionStatus
 from .axis import check_figure
-from .cases import Cases
-from .row import FAILED, Row
+from .cases import FAILED, Cases, Row
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,18 +11,15 @@ import casadi as ca
 import numpy as np
 
 from ...base.checkpoint import Kind
-from ...base.errors import InputError
-from ...base.inputs import file_path
+from ...base.inputs import InputError, file_path
 from ...base.version import __version__
 from ...base.writing import check_writable
 from ...models import Robot
 from ...models.files import AnyRobot, as_robot
-from ..tasks.status import MotionStatus
-from ..tasks.task import Task, read_task
+from ..tasks.task import MotionStatus, Task, read_task
 from .axis import read_axes
-from .cases import Cases
+from .cases import Cases, Row, plan_case
 from .result import Sweep
-from .row import Row, plan_case
 
 KIND = Kind("sweep", "plan")  # a result is a row as JSON, in which floats keep every bit
 

@@ -7,44 +7,11 @@ from typing import Literal
 import numpy as np
 
 from ...models import Robot
-from ...models.body import AnyBody, skeleton
-from ...models.shapes import Shape
-from ..limits.bodies import LOAD, PLATFORM, body_outside, inside_room
-from ..limits.cables import (
-    CableAcceleration,
-    CableClearance,
-    CableJerk,
-    CableLength,
-    CableSpeed,
-    Margin,
-    TensionRate,
-    WinchForce,
-    WinchPower,
-)
-from ..limits.carriers import (
-    CarrierAcceleration,
-    CarrierReach,
-    CarrierSeparation,
-    CarrierSpeed,
-    CarrierTilt,
-    CarrierTurnAcceleration,
-    efforts,
-)
+from ...models.shapes import AnyBody, Shape, skeleton
+from ..limits import cables, carriers, platform
 from ..limits.limit import Limit
 from ..limits.limits import Limits
-from ..limits.natural_frequency import NaturalFrequency
-from ..limits.places import CablesOutside, CarriersOutside, PlatformOutside
-from ..limits.platform import (
-    PlatformAcceleration,
-    PlatformBox,
-    PlatformLateralAcceleration,
-    PlatformSpeed,
-    PlatformTilt,
-    PlatformTurn,
-    TubeAttitude,
-    TubePosition,
-    ZoneSpeed,
-)
+from ..limits.places import LOAD, PLATFORM, CablesOutside, CarriersOutside, PlatformOutside, body_outside, inside_room
 from .task import FreeBase, Task
 from .task_limits import AnyKeepOut, TaskLimits
 
@@ -58,7 +25,7 @@ def limit_list(robot: Robot, task: Task) -> Limits:
         _of_carriers(robot, task),
         (limit for place in given.keep_out for limit in _of_place(robot, place)),
         _of_bodies(robot, task),
-        (effort for index in range(len(robot.carriers)) for effort in efforts(robot, index)),
+        (effort for index in range(len(robot.carriers)) for effort in carriers.efforts(robot, index)),
         _of_tube(task),
         given.own,
     )
@@ -70,33 +37,39 @@ def _of_cables(robot: Robot, task: Task) -> Iterator[Limit]:
     given = task.limits
     winches = [cable.winch if robot.fixed_lengths is None else None for cable in robot.cables]
     speeds = [winch.speed_max if winch else None for winch in winches]
-    yield from CableSpeed.each(robot, [_tighter(given.cable_speed, speed) for speed in speeds])
-    yield from WinchForce.each(robot, [winch.tension_max if winch else None for winch in winches])
-    for kind in (CableAcceleration, CableJerk, WinchPower):
+    yield from cables.CableSpeed.each(robot, [_tighter(given.cable_speed, speed) for speed in speeds])
+    yield from cables.WinchForce.each(robot, [winch.tension_max if winch else None for winch in winches])
+    for kind in (cables.CableAcceleration, cables.CableJerk, cables.WinchPower):
         if (most := getattr(given, kind.name)) is not None:
             yield kind(robot, most)
     if given.cable_length is not None:
-        yield CableLength(robot, given.cable_length.min, given.cable_length.max)
-    if given.cable_clearance is not None and (clearance := CableClearance(robot, given.cable_clearance)).labels:
+        yield cables.CableLength(robot, given.cable_length.min, given.cable_length.max)
+    if given.cable_clearance is not None and (clearance := cables.CableClearance(robot, given.cable_clearance)).labels:
         yield clearance
     if given.natural_frequency is not None:
-        yield NaturalFrequency(robot, given.natural_frequency)
+        yield cables.NaturalFrequency(robot, given.natural_frequency)
     if "margin" in given.soft:
-        yield Margin(robot, task.margin)
+        yield cables.Margin(robot, task.margin)
     if given.tension_rate is not None:
-        yield TensionRate(robot, given.tension_rate)
+        yield cables.TensionRate(robot, given.tension_rate)
 
 
 def _of_platform(given: TaskLimits) -> Iterator[Limit]:
     for zone in given.zone_speed:
-        yield ZoneSpeed(zone.name, zone.centre, zone.radius, zone.speed)
-    kinds = PlatformSpeed, PlatformAcceleration, PlatformLateralAcceleration, PlatformTurn, PlatformTilt
+        yield platform.ZoneSpeed(zone.name, zone.centre, zone.radius, zone.speed)
+    kinds = (
+        platform.PlatformSpeed,
+        platform.PlatformAcceleration,
+        platform.PlatformLateralAcceleration,
+        platform.PlatformTurn,
+        platform.PlatformTilt,
+    )
     for kind in kinds:
         if (most := getattr(given, kind.name)) is not None:
             yield kind(most)
     if given.platform_box is not None:
         for axis, low, high in zip(range(3), given.platform_box.min, given.platform_box.max, strict=True):
-            yield PlatformBox(axis, low, high)
+            yield platform.PlatformBox(axis, low, high)
 
 
 def _of_carriers(robot: Robot, task: Task) -> Iterator[Limit]:
@@ -108,22 +81,22 @@ def _of_carriers(robot: Robot, task: Task) -> Iterator[Limit]:
     if given.carrier_separation == "radius":
         yield from _apart(robot)
     elif given.carrier_separation is not None and len(robot.carriers) > 1:
-        yield CarrierSeparation(robot, given.carrier_separation)
+        yield carriers.CarrierSeparation(robot, given.carrier_separation)
     for index, carrier in enumerate(robot.carriers):
         if not carrier.moves:
             continue
         own, turns = carrier.motion_limits, None if carrier.keeps_attitude else free
         if (most := _tighter(acceleration, own.acceleration)) is not None:
-            yield CarrierAcceleration(robot, index, most)
+            yield carriers.CarrierAcceleration(robot, index, most)
         if (most := _tighter(speed, own.speed)) is not None:
-            yield CarrierSpeed(robot, index, most)
+            yield carriers.CarrierSpeed(robot, index, most)
         if (most := _tighter((turns.tilt_max or None) if turns is not None else None, own.tilt)) is not None:
-            yield CarrierTilt(robot, index, most)
+            yield carriers.CarrierTilt(robot, index, most)
         if turns is not None and turns.turn_acceleration_max is not None:
-            yield CarrierTurnAcceleration(robot, index, turns.turn_acceleration_max)
+            yield carriers.CarrierTurnAcceleration(robot, index, turns.turn_acceleration_max)
         if own.reach is not None:
             for axis, low, high in zip(range(3), own.reach.min, own.reach.max, strict=True):
-                yield CarrierReach(robot, index, axis, low, high)
+                yield carriers.CarrierReach(robot, index, axis, low, high)
 
 
 def _apart(robot: Robot) -> Iterator[Limit]:
@@ -132,7 +105,7 @@ def _apart(robot: Robot) -> Iterator[Limit]:
     pairs = list(combinations([index for index, radius in enumerate(radii) if radius > 0], 2))
     least = [radii[i] + radii[j] for i, j in pairs]
     for distance in dict.fromkeys(least):
-        yield CarrierSeparation(
+        yield carriers.CarrierSeparation(
             robot, distance, [pair for pair, its in zip(pairs, least, strict=True) if its == distance]
         )
 
@@ -196,5 +169,5 @@ def _of_bodies(robot: Robot, task: Task) -> Iterator[Limit]:
 
 def _of_tube(task: Task) -> Iterator[Limit]:
     if np.isfinite(task.tube.radius):
-        yield TubePosition(task.tube.radius)
-    yield from (TubeAttitude(axis, task.tube.turn) for axis in range(3))
+        yield platform.TubePosition(task.tube.radius)
+    yield from (platform.TubeAttitude(axis, task.tube.turn) for axis in range(3))

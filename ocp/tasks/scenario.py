@@ -13,13 +13,13 @@ import numpy as np
 
 from ...base.display import Displayed
 from ...models import Dynamics, Robot, points
-from ...models.body import skeleton
 from ...models.part import Box, PositiveRange, Vector3
+from ...models.shapes import skeleton
 from ..costs.cost import Cost
-from ..costs.costs import Costs
 from ..costs.terms import (
     CarrierAcceleration,
     CarrierOffset,
+    Costs,
     Formation,
     Jerk,
     Margin,
@@ -30,10 +30,9 @@ from ..costs.terms import (
 )
 from ..limits.limit import Hull, Limit
 from ..limits.limits import Limits
-from .deviation import Deviation
 from .paths import AnyPath, Motion, RestPath, TimedPath, WaypointPath
-from .phases import LaidPhase, Phases
-from .scheme import LINEAR, SCHEMES, Scheme
+from .phase import LaidPhase, Phases
+from .scheme import LINEAR, SCHEMES, Deviation, Scheme
 from .task import FreeBase, Task
 from .wind_set import WindBox, WindDisc, WindSet, as_wind, possible_winds_at
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, cast
 
@@ -12,8 +13,7 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 from pydantic.json_schema import SkipJsonSchema
 from typing_extensions import override
 
-from ...base.errors import InputError
-from ...base.inputs import file_path, number
+from ...base.inputs import InputError, file_path, number
 from ...models.parsing import read_yaml, save_yaml, validate
 from ...models.part import (
     Name,
@@ -295,3 +295,20 @@ def read_task(task: Task | dict[str, Any] | str | os.PathLike[str]) -> Task:
     if isinstance(task, dict):
         return validate(task, Task, "task")
     return read_yaml(file_path("task", task, "a Task, a mapping or the path of a YAML file"), Task)
+
+
+class MotionStatus(StrEnum):
+    """The status of a plan or of `time_along`; the values are plain strings."""
+
+    FEASIBLE = "feasible"
+    """The motion keeps every limit, as confirmed by the audit on its dense grid."""
+
+    INFEASIBLE = "infeasible"
+    """No motion that the task allows is feasible, and this is proven: by the certificate of an instant at which no
+    tensions give the required wrench, or by a limit that all these motions exceed (`Audit.excess`). If the duration
+    is free, no duration and no time law that the task allows are feasible. The certificate then refers to the
+    slowest motion, and `Plan.stages` gives the reasons that exclude the others."""
+
+    NOT_FOUND = "not-found"
+    """The search ended without a motion that keeps every limit and without a proof that none exists. Certificate and
+    `excess` refer to the closest motion known."""

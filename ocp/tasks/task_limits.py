@@ -10,8 +10,8 @@ from pydantic import ConfigDict, Field, SerializerFunctionWrapHandler, model_ser
 from pydantic.json_schema import SkipJsonSchema
 
 from ...models import shapes
-from ...models.body import THINNEST
 from ...models.part import Box, NonNegative, Part, Positive, Range, Tilt, Vector3, optional
+from ...models.shapes import THINNEST
 from ..limits.limit import Limit
 
 Distance = Annotated[NonNegative | None, Field(description="least distance [m]; null: no limit")]

@@ -12,20 +12,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...base.errors import InputError
-from ...base.inputs import whole_number
+from ...base.inputs import InputError, whole_number
 from ...models import Robot
 from ...models.files import AnyRobot, as_robot
 from ..audits.audit import Audit, audit
 from ..audits.excess import TENSIONS, Excess
-from ..limits.bodies import Inside
 from ..limits.cables import WinchForce
 from ..limits.carriers import CarrierReach
 from ..limits.limits import Limits
+from ..limits.places import Inside
 from ..limits.platform import ZoneSpeed
 from ..plan import Plan
-from ..tasks.carrier_paths import carrier_paths
-from ..tasks.lay_out import lay_out
+from ..tasks.lay_out import carrier_paths, lay_out
 from ..tasks.limit_list import limit_list
 from ..tasks.paths import (
     AnyPath,
@@ -40,12 +38,10 @@ from ..tasks.paths import (
     WaypointPath,
 )
 from ..tasks.scenario import MOST_SAMPLES, Scenario, least_audit_rate
-from ..tasks.status import MotionStatus
-from ..tasks.task import GivenBase, Task, read_task
+from ..tasks.task import GivenBase, MotionStatus, Task, read_task
 from .fastest_law import FastestLaw
 from .parametrised_path import ParametrisedPath, PathLimits
-from .phase_plane import proofs
-from .piece import RESERVE, Piece, solved_piece
+from .phase_plane import RESERVE, Piece, proofs, solved_piece
 from .timed_task import ACCELERATIONS, KNOWN_LIMITS, SPEEDS, WITHOUT_POWER, check_task
 
 ATTEMPTS = 12

@@ -6,13 +6,48 @@ constant and the limits of both points hold (the Interpolation scheme). Source: 
 time-optimal path parameterization based on reachability analysis", IEEE T-RO 34(3), 2018.
 """
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 from typing_extensions import override
 
-from ...base.imported_late import imported_late
 from ...base.quiet import quiet
+
+
+class _LateModule(ModuleType):
+    """A module whose names come from the real one, which is imported with the first of them."""
+
+    def __getattr__(self, name: str) -> Any:
+        _end()  # for a module, or another thread, that needs a name while the block runs
+        return getattr(import_module(self.__name__), name)
+
+
+@contextmanager
+def imported_late(package: str, module: str) -> Iterator[None]:
+    """Let `import package.module` inside the block wait until it is used, unless the package is imported already."""
+    if package in sys.modules:
+        yield
+        return
+    late = {name: _LateModule(name) for name in (package, f"{package}.{module}")}
+    setattr(late[package], module, late[f"{package}.{module}"])
+    try:
+        sys.modules.update(late)
+        yield
+    finally:
+        _end()
+
+
+def _end() -> None:
+    """Let all imports find the real modules again."""
+    for name, module in list(sys.modules.items()):
+        if type(module) is _LateModule:
+            sys.modules.pop(name, None)
+
 
 with imported_late("matplotlib", "pyplot"):  # toppra draws with it if asked to; it loads for longer than most laws take
     from toppra.algorithm import TOPPRA

@@ -15,8 +15,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from ...base.display import Displayed
-from ...base.errors import InputError
-from ...base.inputs import printable, shown
+from ...base.inputs import InputError, printable, shown
 from ...models.parsing import read_yaml, validate
 from ...models.part import Part
 from ...models.robot import Robot

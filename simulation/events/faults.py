@@ -8,8 +8,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 from typing_extensions import override
 
-from ...base.errors import InputError
-from ...base.inputs import shown
+from ...base.inputs import InputError, shown
 from ...base.text import quantity
 from ...models.part import Whole
 from ...models.robot import Robot

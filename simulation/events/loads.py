@@ -8,8 +8,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 from typing_extensions import override
 
-from ...base.errors import InputError
-from ...base.inputs import shown
+from ...base.inputs import InputError, shown
 from ...base.text import quantity
 from ...models.part import NonNegative, Positive, Vector3, optional
 from ...models.rigid_load import RigidLoad

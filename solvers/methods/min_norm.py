@@ -11,8 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...base.errors import InputError
-from ...base.inputs import real_array, shown
+from ...base.inputs import InputError, real_array, shown
 from ...base.tolerances import DOUBTFUL
 from ..problem import TensionProblem
 from .method import Method, Proposal, StandardForm

@@ -6,8 +6,7 @@ from collections import Counter
 from pathlib import Path
 
 from ...base.writing import whole_file
-from ...figures import page as html
-from ...figures import style
+from ...figures import page as html, style
 from .claim import Account, Chapter, Claim, Verdict, value_text
 
 NOT_REPRODUCED = "What was not reproduced"

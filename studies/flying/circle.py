@@ -11,8 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...figures import plan as figures
-from ...figures import style
+from ...figures import plan as figures, style
 from ...models import load
 from ...ocp import Plan, Task, plan
 from ...ocp.nlp.solver import Progress

@@ -9,8 +9,7 @@ from ...ocp.tasks.paths import Motion
 from ...solvers import TensionProblem, solve
 from ..accounts.claim import Chapter, Claim, Verdict
 from .claims import claim
-from .every_pairing import PAIRINGS, TURN, at_centre, pull_inward
-from .every_pairing import tensions as tensions_of
+from .every_pairing import PAIRINGS, TURN, at_centre, pull_inward, tensions as tensions_of
 from .plans import LINE, RADIUS, RATE, SECONDS, TIMES, circle, steady_tensions
 from .rotations import instants
 

@@ -21,8 +21,7 @@ from ...ocp.tasks.paths import Motion
 from ..accounts.claim import Chapter, Claim
 from .cable import constants
 from .claims import claim
-from .every_pairing import PAIRINGS, PRINTED, at_centre, hold
-from .every_pairing import tensions as tensions_of
+from .every_pairing import PAIRINGS, PRINTED, at_centre, hold, tensions as tensions_of
 from .plans import FEASIBLE, RADIUS, TIMES, circle, steady_tensions
 
 RATIO = 0.1247  # printed: the largest dT / T of cable 1

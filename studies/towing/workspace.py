@@ -27,8 +27,8 @@ import numpy as np
 
 from ...models import Robot
 from ...workspace import ExistsPlacement, ForceBalance, Places
+from ...workspace.domain import three_cable_pose
 from ...workspace.region import reach_boxes
-from ...workspace.three_cable_pose import three_cable_pose
 from ...workspace.volume import Volume, volume
 from .plans import DRIVES, Drive, robot
 

@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 
 from towline.base.errors import InputError, SolverError
 from towline.solvers import TensionProblem, solve, solve_batch
-from towline.solvers.status import STATUSES
+from towline.solvers.solution import STATUSES
 
 from .exact_judge import DOUBLE, FLOAT, Judge
 from .exact_problems import ExactProblem, exact_problem

@@ -23,7 +23,7 @@ import numpy as np
 from towline.benchmarks import harness
 from towline.models import Dynamics, Robot, load
 from towline.solvers import Status, solve_batch
-from towline.solvers.status import STATUSES
+from towline.solvers.solution import STATUSES
 
 from .step_code import Array, StepCode, Steps
 from .step_states import random_states, twelve_cables

@@ -8,9 +8,8 @@ from pydantic import Field
 from ...models import Robot
 from ...models.dynamics import dynamics_of
 from ...models.part import Finite, Rows
-from ..condition import TensionCondition
+from ..condition import Places, TensionCondition
 from ..feasibility import feasible
-from ..places import Places
 
 
 class Dynamic(TensionCondition):

@@ -16,9 +16,8 @@ import numpy as np
 from ...base.errors import InputError
 from ...models import Robot
 from ...models.dynamics import dynamics_of
-from ..condition import Condition
+from ..condition import Condition, Places, check_places
 from ..feasibility import feasible, rest_wrench
-from ..places import Places, check_places
 
 STEPS = 20
 STRIDE = 0.5  # [rad], maximum change of an angle in one step

@@ -16,8 +16,7 @@ from ...base.errors import InputError
 from ...models import Robot
 from ...models.part import NonNegative, optional
 from ...models.points import anchors, attachments
-from ..condition import AnyCondition, Condition
-from ..places import Places
+from ..condition import AnyCondition, Condition, Places
 from ..region import reach_boxes
 
 ROUNDS = 6  # from a box to a sphere and back

@@ -15,8 +15,7 @@ from ...models.part import Box, NonNegative, Positive, optional
 from ...models.points import anchors, attachments, in_frame
 from ...models.polyhedron import Polyhedron
 from ...models.shapes import Block, Capsule, ConvexMesh, Sphere
-from ..condition import Condition
-from ..places import Places
+from ..condition import Condition, Places
 
 _BISECTIONS = 40  # of a cable: its point nearest to a box, to 1e-12 of its length
 _ROUNDING = 1e-12  # of the size of a mesh

@@ -9,8 +9,7 @@ from ...base.errors import InputError
 from ...models import Robot
 from ...models.dynamics import dynamics_of
 from ...models.part import NonNegative, Positive, optional
-from ..condition import Condition
-from ..places import Places
+from ..condition import Condition, Places
 
 
 class Lengths(Condition):

@@ -6,10 +6,9 @@ import numpy as np
 
 from ...models import Robot
 from ...models.part import Finite, optional
-from ...solvers.margins import margins
-from ..condition import Condition
+from ...solvers.margin import margins
+from ..condition import Condition, Places, check_places
 from ..feasibility import rest_wrench, scaled, wrench_matrices, wrench_rows
-from ..places import Places, check_places
 
 
 class Margin(Condition):

@@ -7,9 +7,8 @@ from pydantic import Field, field_validator, model_validator
 
 from ...models import Robot
 from ...models.part import Finite, optional
-from ..condition import Condition
+from ..condition import Condition, Places
 from ..metrics import METRICS, metric_values
-from ..places import Places
 
 
 class MetricInRange(Condition):

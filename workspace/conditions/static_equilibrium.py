@@ -5,9 +5,8 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from ...models import Robot
-from ..condition import TensionCondition
+from ..condition import Places, TensionCondition
 from ..feasibility import feasible, rest_wrench, shortfall, wrench_rows
-from ..places import Places
 
 
 class BalanceAtRest(TensionCondition):

@@ -11,9 +11,8 @@ import numpy as np
 from ...models import Robot
 from ...solvers import solve_batch
 from ...solvers.available_wrench import spans
-from ..condition import Condition
+from ..condition import Condition, Places
 from ..feasibility import wrench_matrices, wrench_rows
-from ..places import Places
 
 
 class WrenchClosure(Condition):

@@ -12,9 +12,8 @@ from pydantic import model_validator
 
 from ...models import Robot
 from ...models.part import Finite, Rows, optional
-from ..condition import TensionCondition
+from ..condition import Places, TensionCondition
 from ..feasibility import feasible, rest_wrench, shortfall
-from ..places import Places
 
 Wrench = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
 

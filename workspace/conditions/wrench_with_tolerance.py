@@ -8,9 +8,8 @@ from pydantic import Field
 from ...models import Robot
 from ...models.part import NonNegative
 from ...solvers import solve_batch
-from ..condition import Condition
+from ..condition import Condition, Places, check_places
 from ..feasibility import NEAREST, rest_wrench, scaled, wrench_matrices, wrench_rows
-from ..places import Places, check_places
 
 
 class WrenchWithTolerance(Condition):

@@ -4,20 +4,13 @@ from typing import Annotated, TypeAlias
 
 from pydantic import Field
 
-from .base import PathBase as PathBase
-from .base import PoseOrPosition as PoseOrPosition
+from .base import Motion as Motion, PathBase as PathBase, PoseOrPosition as PoseOrPosition, Stations as Stations
 from .circle import CirclePath as CirclePath
 from .feed import FeedPath as FeedPath
-from .line import LinePath as LinePath
-from .motion import Motion as Motion
-from .rest import RestPath as RestPath
-from .returning import ReturnPath as ReturnPath
+from .line import LinePath as LinePath, RestPath as RestPath
 from .samples import SamplePath as SamplePath
-from .sequence import SequencePath as SequencePath
-from .sequence import SinglePath as SinglePath
-from .stations import Stations as Stations
-from .timed import Curve as Curve
-from .timed import TimedPath as TimedPath
+from .sequence import ReturnPath as ReturnPath, SequencePath as SequencePath, SinglePath as SinglePath
+from .timed import Curve as Curve, TimedPath as TimedPath
 from .waypoints import WaypointPath as WaypointPath
 
 AnyPath: TypeAlias = Annotated[

@@ -16,7 +16,7 @@ import numpy as np
 
 from ....models.batch import call
 from ....models.rotation import angles_of, inverse_rate_matrix, rate_matrix_derivative, rotation
-from .motion import Motion
+from .base import Motion
 
 Progress = tuple[np.ndarray, np.ndarray, np.ndarray]
 HALF_TURN = 1e-9  # of the real part of a quaternion: both ways are equally short, and the angles decide

@@ -1,17 +1,77 @@
-"""`PathBase`: what every path has: a frame, a duration or none, and a pose at every time."""
+"""`PathBase`, the base of all paths: a frame, a duration or none, and a pose at every time, with its `Motion`."""
 
-from collections.abc import Collection
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import BeforeValidator, ValidationInfo
 
+from ....base.display import record
 from ....base.inputs import shown
 from ....models.part import Part, Pose, Vector3, optional
-from .motion import Motion
-from .stations import Stations
+
+
+class Motion(NamedTuple):
+    """Poses over time and their derivatives; times come first, coordinates (x, y, z, roll, pitch, yaw) last.
+
+    Where a path is taken as a curve, the fraction s of it stands for the time and derivatives are by s.
+    """
+
+    pose: np.ndarray  # (n, 6) [m, rad]
+    velocity: np.ndarray  # (n, 6) [m/s, rad/s]
+    acceleration: np.ndarray  # (n, 6) [m/s^2, rad/s^2]
+
+    __repr__ = record
+
+    @classmethod
+    def still(cls, pose: np.ndarray) -> Motion:
+        """Return poses (n, 6) at rest."""
+        return cls(pose, np.zeros_like(pose), np.zeros_like(pose))
+
+    def plus(self, deviation: Iterable[np.ndarray]) -> Motion:
+        """Add a deviation of pose, velocity and acceleration, coordinate by coordinate."""
+        return Motion(*(mine + its for mine, its in zip(self, deviation, strict=True)))
+
+    def timed(self, sd: np.ndarray | float, sdd: np.ndarray | float) -> Motion:
+        """Return the motion over time of a curve by s, from ds/dt [1/s] and d2s/dt2 [1/s^2] at its points, (n,)."""
+        shape = (-1, *[1] * (self.pose.ndim - 1))
+        sd, sdd = np.reshape(sd, shape), np.reshape(sdd, shape)
+        return Motion(self.pose, self.velocity * sd, self.velocity * sdd + self.acceleration * sd**2)
+
+
+class Stations(NamedTuple):
+    """The waypoints of a path, in order."""
+
+    names: tuple[str, ...] = ()  # as in the path's file: `points[2]`
+    times: np.ndarray = np.zeros(0)  # when the path passes each, or arrives to dwell, (n,) [s]; nan if unknown
+    poses: np.ndarray = np.zeros((0, 6))  # in the frame of the path [m, rad]
+
+    @classmethod
+    def joined(cls, parts: Iterable[tuple[str, float, Stations]]) -> Stations:
+        """Return the waypoints of a sequence of paths, from the key and the start [s] of each."""
+        kept = [(key, start, its) for key, start, its in parts if its.names]
+        return cls(
+            tuple(f"{key}.{name}" for key, _, its in kept for name in its.names),
+            np.concatenate([np.zeros(0), *(start + its.times for _, start, its in kept)]),
+            np.concatenate([np.zeros((0, 6)), *(its.poses for _, _, its in kept)]),
+        )
+
+    @property
+    def windows(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the times of the station before each and of the one after it, (n,) each [s]; infinite if unknown."""
+        edges = np.concatenate([[-np.inf], self.times, [np.inf]])
+        low, high = edges[:-2], edges[2:]
+        return np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)
+
+    def since(self, start: float) -> Stations:
+        """Return the waypoints from the time `start` [s] on, with times that count from it."""
+        later = self.times >= start
+        names = tuple(name for name, kept in zip(self.names, later, strict=True) if kept)
+        return Stations(names, self.times[later] - start, self.poses[later])
 
 
 def _with_level_attitude(value: object) -> object:

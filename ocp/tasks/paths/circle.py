@@ -8,8 +8,7 @@ from pydantic import Field
 from typing_extensions import override
 
 from ....models.part import Direction, Finite, NonNegative, Vector3, optional
-from .base import PathBase
-from .motion import Motion
+from .base import Motion, PathBase
 
 ALONG_X = 1e-6  # the part of the x axis across the circle's axis has no reliable direction if it is shorter
 

@@ -4,8 +4,7 @@ import math
 import re
 from typing import Any
 
-from ....base.errors import InputError
-from ....base.inputs import printable, shown
+from ....base.inputs import InputError, printable, shown
 
 UNITS = {20: 0.0254, 21: 0.001}  # [m]: inches, millimetres
 MOVES = {0, 1, 2, 3}

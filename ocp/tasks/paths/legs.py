@@ -22,7 +22,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from .attitudes import Attitudes, Progress, nearest_turn
-from .motion import Motion
+from .base import Motion
 from .overlap import MOST, SMOOTHER, USUAL, Overlap, size
 
 BLEND = 0.01  # of the span of the points; accelerations hardly fall with more

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....base.display import Displayed
-from .rest_to_rest import SMOOTHER_PEAK, smoother_rest_to_rest
+from .line import SMOOTHER_PEAK, smoother_rest_to_rest
 
 RAMP = 0.1  # of the leg, in which the acceleration rises from zero to its peak; it changes sign in twice that
 PEAK = 4 / (1 - 2 * RAMP + 0.4 * RAMP**2)  # so that the way is 1

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from ....base.csv_columns import ANGLES, LENGTHS, TIMES, read_columns, unit_factor
-from ....base.errors import InputError
-from ....base.inputs import printable, shown
+from ....base.inputs import InputError, printable, shown
 from ....base.reading import read_bytes
 from .gcode import read_gcode
 

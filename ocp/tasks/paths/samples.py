@@ -7,8 +7,7 @@ from pydantic import Field, model_validator
 from typing_extensions import override
 
 from ....models.part import Finite
-from .base import PathBase, PoseOrPosition, check_times
-from .motion import Motion
+from .base import Motion, PathBase, PoseOrPosition, check_times
 
 
 class SamplePath(PathBase):

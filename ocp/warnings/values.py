@@ -1,15 +1,20 @@
-"""`slipped_units`: numbers that fit the robot only in another unit, such as millimetres instead of metres."""
+"""Values of which a plan warns: numbers that fit only in another unit, cable lengths, long turns, weak formations."""
 
 import re
 from collections.abc import Iterator, Mapping
+from math import pi, remainder
 from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel
 
 from ...base.text import quantity
+from ...base.tolerances import INDEPENDENT
 from ...models import Robot
+from ...solvers.certificate import direction_text
+from ..tasks.paths import LinePath, PathBase, SequencePath
 from ..tasks.task import Task
+from .positions import Instants
 
 READS = "towline reads"  # is in each sentence
 OTHERS = {  # by the unit that is read: its name, and the names and sizes of units that are written instead
@@ -188,3 +193,114 @@ def _durations(robot: Robot, task: Task) -> Iterator[_Suspect]:
         named = tuple(name for name, seconds in units if 2 * least <= seconds * part.duration <= most / 100)
         if named and not least <= part.duration <= most:
             yield _Suspect(key, part.duration, "large" if part.duration > most else "small", "s", named)
+
+
+SHORT = 0.05  # of a cable's length at home
+SLACK = -1e-6  # of the weight: less tension than that is slack
+
+
+def short_cables(seen: Instants) -> list[str]:
+    """Return a sentence if cables get shorter than `SHORT` of their length at home; none if their lengths are fixed."""
+    robot = seen.robot
+    if robot.fixed_lengths is not None:
+        return []
+    at_home = seen.dynamics.cable_lengths(robot.home)
+    lengths = seen.dynamics.cable_lengths(seen.pose, seen.carriers)
+    shares = lengths / at_home
+    short = np.flatnonzero(shares.min(axis=0) < SHORT)
+    if not short.size:
+        return []
+    row, cable = np.unravel_index(int(shares.argmin()), shares.shape)
+    others = f", and so do {short.size - 1} more cables" if short.size > 2 else ", and so does one more"
+    tows = robot.carriers[robot.carrier_of_cable[cable]].tows
+    fixed = ", and with drive: fixed-length in the robot's file no winch reels it in" * tows
+    return [
+        f"cable {cable + 1} gets as short as {quantity(1e3 * lengths[row, cable], 'mm', 3)} at t = "
+        f"{seen.times[row]:.3f} s, {quantity(100 * shares[row, cable], '%', 2)} of its "
+        f"{quantity(at_home[cable], 'm', 3)} at home{others * (short.size > 1)}; limits.cable_length would keep it "
+        f"longer{fixed}"
+    ]
+
+
+def fixed_cables(seen: Instants, tensions: np.ndarray) -> list[str]:
+    """Return a sentence if the lengths of cables of fixed length do not keep the planned tensions, (n, m) [N].
+
+    Lengths are such that the first tensions are as planned. From then on cables in a motion as planned have the
+    tensions t that give the required wrench with the least elastic energy of their changes:
+
+        min  (t - t_0)' diag(l / EA) (t - t_0)    s.t.  A t = A t_plan
+    """
+    robot = seen.robot
+    stiffness = np.array([cable.stiffness or 0.0 for cable in robot.cables])
+    if robot.fixed_lengths is None or not stiffness.all() or not np.isfinite(tensions).all():
+        return []
+    root = np.sqrt(robot.fixed_lengths / stiffness)
+    A = robot.wrench_scale[:, None] * seen.dynamics.wrench_matrix(seen.pose, seen.carriers) / root
+    A = A[:, np.flatnonzero(robot.dof_mask)]
+    change = np.linalg.pinv(A, 1e-6) @ (A @ (root * (tensions - tensions[0]))[..., None])
+    kept = tensions[0] + change[..., 0] / root
+    row, cable = np.unravel_index(int(kept.argmin()), kept.shape)
+    if kept[row, cable] >= SLACK * robot.force_scale:
+        return []
+    planned = quantity(tensions[row, cable], "N", 2)
+    return [
+        f"cable {cable + 1} can go slack at t = {seen.times[row]:.3f} s, where {planned} are planned: the lengths of "
+        "cables of fixed length determine how they share the load; a larger margin could keep them taut"
+    ]
+
+
+SHORT_OF_WHOLE = 1e-3  # [rad], by which a turn must be less than a whole one, which is meant
+OTHER_WAY = "the other way to the same attitude"
+
+
+def long_turns(path: PathBase) -> list[str]:
+    """Return a sentence for each angle of a line, also of a part of a sequence, that turns the longer way."""
+    if isinstance(path, SequencePath):
+        return [sentence for piece in path.parts for sentence in long_turns(piece.path)]
+    if not isinstance(path, LinePath):
+        return []
+    found = []
+    for name, start, end in zip(("roll", "pitch", "yaw"), path.start[3:], path.end[3:], strict=True):
+        short = remainder(end - start, 2 * pi)
+        if pi < abs(end - start) < 2 * pi - SHORT_OF_WHOLE:
+            turns, least = (quantity(np.rad2deg(abs(turn)), "degrees", 4) for turn in (end - start, short))
+            other = f"{OTHER_WAY}, to a {name} of {quantity(start + short, 'rad', digits=6)}, is {least}"
+            found.append(f"the line turns by {turns} in {name}; {other}")
+    return found
+
+
+WEAK = 0.05  # of the smallest singular value at home
+LEAST_SHARE = 1e-4  # smaller shares are reported as less than this
+SMALLER = 0.3  # of the formation, as advice
+
+
+def weak_formation(seen: Instants, formation: float | None = None) -> list[str]:
+    """Return a sentence if the wrench matrix comes close to losing rank, in comparison with home.
+
+    Moments are divided by the robot's length. Singular values that are near zero at home do not count, unless they are
+    so in the motion, too. `formation` is the objective's [m]; default: the mean length of the cables.
+    """
+    robot = seen.robot
+    rows = np.flatnonzero(robot.dof_mask)
+    scale = np.repeat([1.0, 1.0 / robot.length], 3)[rows, None]
+    at_home = np.linalg.svd(scale * seen.dynamics.wrench_matrix(robot.home)[rows], compute_uv=False)
+    rank = int((at_home > INDEPENDENT * at_home[0]).sum())
+    U, values, _ = np.linalg.svd(scale * seen.dynamics.wrench_matrix(seen.pose, seen.carriers)[:, rows])
+    lost = rank < len(rows) <= robot.m and values[:, -1].min() <= INDEPENDENT * at_home[0]
+    last = values.shape[1] - 1 if lost else rank - 1
+    k, direction = int(values[:, last].argmin()), np.zeros(6)
+    direction[rows], share = U[k, :, last], values[k, last] / at_home[last]
+    if lost:
+        return [
+            f"at t = {seen.times[k]:.3f} s, as at home, the cables cannot pull along {direction_text(direction)}, "
+            "because the wrench matrix is singular; other homes of the carriers could change that"
+        ]
+    if share > WEAK:
+        return []
+    of_home = quantity(100 * share, "%", 2) if share >= LEAST_SHARE else f"less than {100 * LEAST_SHARE:g} %"
+    smaller = quantity(SMALLER * (formation or float(seen.dynamics.cable_lengths(robot.home).mean())), "m", 2)
+    return [
+        f"from where the carriers are at t = {seen.times[k]:.3f} s, the cables pull along {direction_text(direction)} "
+        f"with {of_home} of their effect at home; a smaller objective.formation, such as "
+        f"{smaller}, keeps carriers closer to their formation at home"
+    ]
