@@ -13,7 +13,8 @@ from ..base.display import Displayed, tensions_over_time
 from ..solvers import Certificate
 from ..statics.robust import RobotShare, share_of_robots
 from .audits.audit import Audit
-from .audits.phase_summary import PhaseSummary, WaypointDistance, infeasible_spans, summaries, waypoint_distance
+from .audits.phase_summary import PhaseSummary, infeasible_spans, summaries
+from .audits.waypoint_distance import WaypointDistance, waypoint_distance
 from .tasks.paths import Motion
 from .tasks.scenario import Scenario
 from .tasks.scheme import Deviation

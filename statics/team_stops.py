@@ -23,7 +23,8 @@ from ..models.dynamics import dynamics_of
 from ..models.robot import Robot
 from ..models.trajectory import Motion, Trajectory
 from .continuation import RESTS, before, continued, faded, slopes
-from .winch_forces import carriers_of, excess_of, forces_of_winches, has_winches, limits_of, pull_of, worst_of
+from .team_limits import carriers_of, excess_of, limits_of, pull_of, worst_of
+from .winch_forces import forces_of_winches, has_winches
 
 SHORTEST, LONGEST = 0.1, 10.0  # the shortest stop [s], and the longest one over a usual one
 ATTEMPTS, USUAL = 12, 2.5  # durations that are tried, all at once, and a usual one, of sqrt(length / g)

@@ -11,7 +11,8 @@ from towline.ocp.planner import Planner
 from towline.ocp.reports.report import sections
 from towline.ocp.result import Offers
 from towline.ocp.search.largest_share import _largest, largest_share
-from towline.ocp.search.other_paths import other_yaws, shifted, smaller_t_min
+from towline.ocp.search.other_forces import smaller_t_min
+from towline.ocp.search.other_paths import other_yaws, shifted
 from towline.ocp.search.search import Search
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task

@@ -28,21 +28,23 @@ from ..tasks.scheme import Deviation
 from ..tasks.task import MotionStatus, Task, Tube
 from ..tasks.task_limits import TaskLimits
 from .largest_share import Change, Maker, at_ease, by_programs, exceeds, largest_share, rests, together
-from .other_paths import (
-    as_wide_as_states,
+from .other_forces import (
     larger_t_max,
     less_margin,
     less_wind,
     lighter_load,
     lighter_platform,
+    smaller_t_min,
+    surer_load,
+)
+from .other_paths import (
+    as_wide_as_states,
     near_home,
     nearer_end,
     other_yaws,
     shifted_path,
     shortest_shift,
     smaller_circle,
-    smaller_t_min,
-    surer_load,
     tilting_platform,
 )
 from .past_regions import IN_THE_WAY, fewer_regions, past_regions
