@@ -38,6 +38,15 @@ from .quiet import quiet
 LEFT_TO_PARENT = {signal.SIGINT, signal.SIGTERM}
 
 _running: WeakSet[_Spawning] = WeakSet()
+MOST_WORKERS = 1024
+AHEAD = 3  # jobs for each worker, one of which it works on
+CONNECT_WITHIN = 5.0  # [s]
+WORKERS_WITHIN = 30.0  # [s]
+LOOK_EVERY = 1.0  # [s]
+WITHOUT_WORKERS = 5.0  # [s]; a scheduler's worker that was killed is often started again
+NOISY = ("distributed", "distributed.client", "asyncio", "tornado.application")  # of a scheduler that ends
+Result = TypeVar("Result")
+Progress = Callable[[int, int, int], None]
 
 
 class _Processes(ProcessPoolExecutor):
@@ -151,18 +160,6 @@ def _begin_worker(alive: Any) -> None:
         os._exit(1)
 
     threading.Thread(target=end_with_it, daemon=True).start()
-
-
-MOST_WORKERS = 1024
-AHEAD = 3  # jobs for each worker, one of which it works on
-CONNECT_WITHIN = 5.0  # [s]
-WORKERS_WITHIN = 30.0  # [s]
-LOOK_EVERY = 1.0  # [s]
-WITHOUT_WORKERS = 5.0  # [s]; a scheduler's worker that was killed is often started again
-NOISY = ("distributed", "distributed.client", "asyncio", "tornado.application")  # of a scheduler that ends
-
-Result = TypeVar("Result")
-Progress = Callable[[int, int, int], None]
 
 
 class ExecutionOptions(TypedDict, total=False):

@@ -14,6 +14,12 @@ from .part import LARGEST
 MOST_FACES = 200  # what a distance costs grows with them
 FLAT = 1e-9  # of the largest extent: thinner bodies have no inside
 SAME_PLANE = 1e-6  # difference of unit normals, and of distances relative to the size: files have 7 digits
+LARGEST_FILE = 50_000_000  # [bytes], of text with as many triangles
+MOST = 250_000  # triangles
+HEADER = 84  # bytes of a binary file before its triangles
+RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")  # in small letters
+MARK = b"\xef\xbb\xbf"  # with which some editors begin a text in UTF-8
 
 
 class Polyhedron(NamedTuple):
@@ -84,14 +90,6 @@ def _edges(triangles: np.ndarray, neighbours: np.ndarray, face_of: np.ndarray) -
             if triangle < beside[opposite] and face_of[triangle] != face_of[beside[opposite]]:
                 edges.append(np.delete(ends, opposite))
     return np.array(edges)
-
-
-LARGEST_FILE = 50_000_000  # [bytes], of text with as many triangles
-MOST = 250_000  # triangles
-HEADER = 84  # bytes of a binary file before its triangles
-RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")  # in small letters
-MARK = b"\xef\xbb\xbf"  # with which some editors begin a text in UTF-8
 
 
 def read_stl(path: Path) -> np.ndarray:

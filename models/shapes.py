@@ -14,6 +14,8 @@ from .points import placed, rotations
 from .polyhedron import Polyhedron, convex_hull, polyhedron, read_stl
 
 DENT = 1e-5  # of its size by which a convex surface may be inside its hull: files have 7 digits
+THINNEST = 1e-5  # [m] of a body or place: distances are rounded by a tenth of it where things touch
+SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))  # of a box's corners
 
 
 class _Round:
@@ -189,8 +191,6 @@ def _dent(body: Polyhedron, triangles: np.ndarray) -> float:
     return deepest
 
 
-THINNEST = 1e-5  # [m] of a body or place: distances are rounded by a tenth of it where things touch
-SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))  # of a box's corners
 EDGES = [pair for pair in combinations(range(8), 2) if np.abs(SIGNS[pair[0]] - SIGNS[pair[1]]).sum() == 2]
 
 

@@ -30,6 +30,10 @@ from ..models.rotation import rotation
 UNSTABLE = 1e-3  # [Hz]; slower than this counts as neutral
 DESCENTS = 4  # from a saddle, along its unstable motion
 SAME = 1e-5  # poses nearer than this, in sizes of the robot and radians, are one solution
+NEWTON = 60  # most steps
+SETTLED = 1e-6  # robot lengths: after shorter steps, errors of tensions and lengths are far below `ROUNDING`
+ROUNDING = 1e-9  # of the weight and the length
+SLACK = 1e-3  # of the weight: a cable that would pull less at the start is slack there
 
 
 @dataclass(frozen=True)
@@ -186,12 +190,6 @@ def _same(robot: Robot, one: Equilibrium, other: Equilibrium) -> bool:
     turns = rotation(ca.DM(one.pose)[3:6]).full() - rotation(ca.DM(other.pose)[3:6]).full()
     apart = np.linalg.norm(one.pose[:3] - other.pose[:3]) / robot.size
     return bool(apart < SAME and np.abs(turns).max() < SAME)
-
-
-NEWTON = 60  # most steps
-SETTLED = 1e-6  # robot lengths: after shorter steps, errors of tensions and lengths are far below `ROUNDING`
-ROUNDING = 1e-9  # of the weight and the length
-SLACK = 1e-3  # of the weight: a cable that would pull less at the start is slack there
 
 
 def rest_near(robot: Robot, lengths: np.ndarray, start: np.ndarray, carriers: np.ndarray) -> Equilibrium | None:

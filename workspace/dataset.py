@@ -37,6 +37,8 @@ from .metrics import metric_values
 from .sampling import Sampler
 
 RESOLUTION = 32  # cells along each axis
+METRES = {"units": "m"}
+OF_THIS_RUN = ("seconds", "poses_per_s", "workers")  # left out of files, which are equal whatever computed them
 
 
 class Counts:
@@ -146,10 +148,6 @@ class Counter(Displayed):
                     counts.keep_samples(np.column_stack([self.domain.numbers(kept), *values]), held[rows])
                 flags.append(np.packbits(held).tobytes())
         return counts, flags
-
-
-METRES = {"units": "m"}
-OF_THIS_RUN = ("seconds", "poses_per_s", "workers")  # left out of files, which are equal whatever computed them
 
 
 def dataset(

@@ -16,6 +16,8 @@ from ..models.points import anchors, attachments
 from .condition import Places
 from .region import AngleBox, Region, reach_boxes, room, surrounding_box
 
+THINNEST = 1e-9  # [m or rad]; thinner than this is no extent
+
 
 def three_cable_pose(robot: Robot, attitude: np.ndarray, carriers: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     """Return positions of a platform on three cables of given lengths at given attitudes.
@@ -49,9 +51,6 @@ def three_cable_pose(robot: Robot, attitude: np.ndarray, carriers: np.ndarray, l
 def _square(vectors: np.ndarray) -> np.ndarray:
     """Return squared lengths, (n, 1)."""
     return np.einsum("ni,ni->n", vectors, vectors)[:, None]
-
-
-THINNEST = 1e-9  # [m or rad]; thinner than this is no extent
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,11 @@ from ..models.points import rotations
 from ..models.shapes import skeleton
 from .condition import Condition, Places
 
+SCATTERED = 4000  # poses of the first round, at distances of all magnitudes
+ROUNDS, AROUND, BETWEEN = 10, 400, 40  # then about the best pose so far, and on the line to it
+SHRINK = 0.6  # of the surroundings, each round
+NEAREST = 1e-4  # of the size, in the first round
+
 
 class AngleBox(Box):
     """A box of attitudes (roll, pitch, yaw) [rad]."""
@@ -94,12 +99,6 @@ def reach_boxes(robot: Robot) -> dict[str, Box]:
     """Return the reach boxes of the carriers that have one, by name."""
     boxes = {carrier.name: carrier.motion_limits.reach for carrier in robot.carriers}
     return {name: box for name, box in boxes.items() if box is not None}
-
-
-SCATTERED = 4000  # poses of the first round, at distances of all magnitudes
-ROUNDS, AROUND, BETWEEN = 10, 400, 40  # then about the best pose so far, and on the line to it
-SHRINK = 0.6  # of the surroundings, each round
-NEAREST = 1e-4  # of the size, in the first round
 
 
 def nearest_feasible(

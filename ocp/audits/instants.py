@@ -21,6 +21,11 @@ from .by_phase import distribution, taken_up
 from .tensions import in_all_winds, scaled, with_all_loads
 
 SPARES = 0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2  # of the weight: what exceeds motors where that is necessary, in order
+OF_INSTANTS = (
+    *("times", "tensions", "off_path", "A", "w", "tensions_unlimited", "gains", "violation", "supports"),
+    *("other_w", "other_tensions"),
+)
+MOTIONS = ("motion", "carriers")
 
 
 def within_motors(
@@ -61,13 +66,6 @@ def within_motors(
             chosen[rows[found.feasible]] = found.tensions[found.feasible]
             exceeded[rows[found.feasible]] = False
     return chosen
-
-
-OF_INSTANTS = (
-    *("times", "tensions", "off_path", "A", "w", "tensions_unlimited", "gains", "violation", "supports"),
-    *("other_w", "other_tensions"),
-)
-MOTIONS = ("motion", "carriers")
 
 
 @dataclass(frozen=True)

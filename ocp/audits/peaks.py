@@ -25,6 +25,15 @@ from .tensions import tolerance_of
 
 SAME = 1e-7  # of the whole time: nearer instants are the two sides of a jump
 SAFETY = 2.0
+BESIDE = 2e-9  # of the duration: how far before a jump
+APART = 1e-4  # of the time between two instants: a corner that is nearer to one is as good as at it
+PARTS = 4  # of the time between two instants, at a time: most of it that has to be halved has to be halved again
+MOST_ROUNDS = 10  # of such parts
+WIDE = 3  # instants to each side of a span, which its curvature needs
+SINGULAR = 1e-12  # of the squares of all that the cables can change: what is so little counts as nothing
+MOST_ROOM = 1e3  # of the weight: limits may be infinite
+BLOCK = 8192  # instants whose matrices are in memory at once, besides those of all
+UNDECIDED = 0.05  # of a tolerance: less than that beyond it is not looked for
 
 
 def is_jump(times: np.ndarray) -> np.ndarray:
@@ -48,17 +57,6 @@ def between(times: np.ndarray, bent: np.ndarray) -> np.ndarray:
     padded = np.concatenate([bent[:1], bent, bent[-1:]])
     most = np.maximum(np.maximum(padded[:-3], padded[1:-2]), np.maximum(padded[2:-1], padded[3:]))
     return SAFETY / 8 * most * (np.diff(times) ** 2).reshape(-1, *[1] * (bent.ndim - 1))
-
-
-BESIDE = 2e-9  # of the duration: how far before a jump
-APART = 1e-4  # of the time between two instants: a corner that is nearer to one is as good as at it
-PARTS = 4  # of the time between two instants, at a time: most of it that has to be halved has to be halved again
-MOST_ROUNDS = 10  # of such parts
-WIDE = 3  # instants to each side of a span, which its curvature needs
-SINGULAR = 1e-12  # of the squares of all that the cables can change: what is so little counts as nothing
-MOST_ROOM = 1e3  # of the weight: limits may be infinite
-BLOCK = 8192  # instants whose matrices are in memory at once, besides those of all
-UNDECIDED = 0.05  # of a tolerance: less than that beyond it is not looked for
 
 
 def _corners(seen: Instants) -> np.ndarray:

@@ -11,6 +11,8 @@ from ..tasks.scenario import Scenario
 from .audit import Audit
 from .by_phase import worst_certificate
 
+MOST_SPANS = 8
+
 
 class PhaseSummary(NamedTuple):
     """A phase of a motion."""
@@ -38,9 +40,6 @@ def summaries(scenario: Scenario, audit: Audit) -> tuple[PhaseSummary, ...]:
             reaction = float(audit.supports[rows].sum(axis=1).max())
         result.append(PhaseSummary(phase.name, phase.start, phase.end, float(phase.load[0]), *extremes, reaction))
     return tuple(result)
-
-
-MOST_SPANS = 8
 
 
 def infeasible_spans(scenario: Scenario, audit: Audit) -> tuple[Certificate, ...]:

@@ -16,6 +16,8 @@ from .clear_space import ClearSpace
 
 SLIDES = 6  # past obstacles on the way to one target
 LONGEST = 0.4  # of the distance of both ends: steps of the trees
+PLACES = 61  # along the usual guess, the first time
+STILL = 1e-9  # [m, rad]: nothing moves, nothing is exceeded
 
 
 class _Tree:
@@ -114,10 +116,6 @@ def connect(
                 return np.stack(path[::-1] if swapped else path)
         near, far, swapped = far, near, not swapped
     return None
-
-
-PLACES = 61  # along the usual guess, the first time
-STILL = 1e-9  # [m, rad]: nothing moves, nothing is exceeded
 
 
 def is_open(scenario: Scenario) -> bool:

@@ -22,6 +22,7 @@ from .limit import Limit, Rate, Rows
 from .state import State
 
 SMALLEST = 1e-3  # [m], of the scale of a length
+LEAST_PIVOT = 1e-3  # relative: rows are divided by a pivot, or by this if it is less
 
 
 def names(robot: Robot) -> tuple[str, ...]:
@@ -167,9 +168,6 @@ class TensionRate(EachCable, Rate):
     @override
     def values(self, state: State) -> ca.SX:
         return state.tensions
-
-
-LEAST_PIVOT = 1e-3  # relative: rows are divided by a pivot, or by this if it is less
 
 
 class NaturalFrequency(Limit):

@@ -23,6 +23,15 @@ from ...models.shapes import Block, Capsule, ConvexMesh, Shape, Sphere
 Point: TypeAlias = Any  # (3, 1), SX or DM
 _Height: TypeAlias = tuple[Any, Any]  # height above a face at the start of a segment, and its change to the end [m]
 _FLAT = 1e-12  # share of a segment's squared length: less of it along the axes that count is a segment beside the box
+_TINY_GAP = 1e-20  # [m^2], keeps the root's derivative finite where things touch
+_NO_LENGTH = 1e-20  # [m^2], of a cable without length
+_PARALLEL = 1e-12  # squared sine of the angle of two lines below which any point of them is as near as the others
+_ROUNDING = 1e-12  # of the size of a body
+_FINE = 2.0**-40  # of a segment
+_CUTS = 6  # each a cutting plane and a bisection: of the place where a cable is deepest
+Place: TypeAlias = Shape
+_TINY = 1e-12  # [m^2], keeps the root's derivative finite where things touch
+_SHORT = 1e-18  # [m^2], of a segment that is a point
 
 
 def within_segment(share: Any) -> Any:
@@ -108,14 +117,6 @@ def _first(holds: list[Any]) -> list[Any]:
 def _weighted(chosen: list[Any], lines: list[_Height]) -> _Height:
     value, slope = (sum(one * line[k] for one, line in zip(chosen, lines, strict=True)) for k in range(2))
     return value, slope
-
-
-_TINY_GAP = 1e-20  # [m^2], keeps the root's derivative finite where things touch
-_NO_LENGTH = 1e-20  # [m^2], of a cable without length
-_PARALLEL = 1e-12  # squared sine of the angle of two lines below which any point of them is as near as the others
-_ROUNDING = 1e-12  # of the size of a body
-_FINE = 2.0**-40  # of a segment
-_CUTS = 6  # each a cutting plane and a bisection: of the place where a cable is deepest
 
 
 def point_outside_mesh(place: ConvexMesh, p: Point) -> Any:
@@ -268,12 +269,6 @@ def _squared(p: Any, p_end: Any, starts: Any, edges: Any) -> Any:
     s = ca.if_else(t < 0, within_segment(-c / a), ca.if_else(t > 1, within_segment((b - c) / a), s))
     gap = between + ca.mtimes(s, along.T) - ca.repmat(within_segment(t), 1, 3) * edges
     return ca.sum2(gap**2)
-
-
-Place: TypeAlias = Shape
-
-_TINY = 1e-12  # [m^2], keeps the root's derivative finite where things touch
-_SHORT = 1e-18  # [m^2], of a segment that is a point
 
 
 def between_points(p: Point, q: Point) -> Any:

@@ -23,6 +23,9 @@ from .distance import Distance, Pair
 from .state import State
 
 ON_BODY = 1e-6  # [m], above the surface of a body: what is less outside counts as a part of it
+PLATFORM, LOAD = "platform's body", "load's body"  # in texts
+WITHIN = " within "  # in texts, between a body and a side of its room
+PLACES = (1 / 3, 2 / 3, 1.0)  # on the way from one instant to the next: so far apart a body cannot jump over a region
 
 
 class Outside(Distance):
@@ -119,11 +122,6 @@ class CablesOutside(Outside):
         anchors = self._points(state, state.anchors)
         ends = ca.SX(ca.DM(state.robot.attachments.T)) if self._riding else state.attachments
         return [Pair(ca.horzcat(ends[:, i], anchors[:, i]), ca.SX(3, 0)) for i in range(state.robot.m)]
-
-
-PLATFORM, LOAD = "platform's body", "load's body"  # in texts
-WITHIN = " within "  # in texts, between a body and a side of its room
-PLACES = (1 / 3, 2 / 3, 1.0)  # on the way from one instant to the next: so far apart a body cannot jump over a region
 
 
 class BodyOutside(Outside):

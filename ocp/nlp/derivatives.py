@@ -24,6 +24,8 @@ from .held import eased
 from .near import is_local
 from .rows import Row, Tightening
 
+Constraints: TypeAlias = tuple[list[ca.SX], list[Row]]  # values, and their names and bounds
+
 
 @dataclass(frozen=True, eq=False)
 class Differentiable(Displayed):
@@ -240,9 +242,6 @@ def _mapped(function: Differentiable, columns: dict[str, Any], places: np.ndarra
 def _groups(values: ca.MX | ca.DM, size: int) -> ca.MX | ca.DM:
     """Return the columns of each interval but its end's, one below the other."""
     return ca.reshape(values[:, :-1], values.shape[0] * size, -1)
-
-
-Constraints: TypeAlias = tuple[list[ca.SX], list[Row]]  # values, and their names and bounds
 
 
 class Part(NamedTuple):

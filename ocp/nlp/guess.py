@@ -34,6 +34,7 @@ CLEARANCE = 0.05  # [m] that a guess stays farther away than it must
 VIOLATION = 1e3  # cost of a metre of violation of a distance
 UNUSUAL = 1e-2  # cost of the formation farthest from the usual one
 AHEAD = 0.1  # of the path: where it begins to change
+ATTITUDES_MEET = 3  # rounds: where the cables leave a quadrotor depends on how it tilts, a little
 
 
 @dataclass(frozen=True)
@@ -209,9 +210,6 @@ def _end_cost(scenario: Scenario, size: np.ndarray) -> np.ndarray:
     kept[YAW] = of_platform == "exact"
     kept[SQUEEZE] = of_carriers in ("exact", "periodic")
     return VIOLATION**2 * np.abs(size) @ kept
-
-
-ATTITUDES_MEET = 3  # rounds: where the cables leave a quadrotor depends on how it tilts, a little
 
 
 def initial_guess(scenario: Scenario, nodes: np.ndarray) -> Deviation:

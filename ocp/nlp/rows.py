@@ -19,6 +19,10 @@ from ..tasks.scenario import POSITION, Scenario
 from .held import Spans, held_spans
 
 DURATION, MARGIN = "duration", "margin"
+OTHER_COSTS = 1e-6  # of all but the missing wrench, in the elastic program: which is then the least there is
+MANY = 12  # free coordinates: robots with more are teams
+STEPS = 4  # a motion is rarely that many times as fast as its reference
+LEAST = 4  # steps of a phase, where there are enough
 
 
 @dataclass(frozen=True)
@@ -80,11 +84,6 @@ class Layout(Displayed):
     def at(self, name: str) -> int | None:
         """Return the index of a shared unknown; None if there is none."""
         return self.shared.start + self.carried.index(name) if name in self.carried else None
-
-
-OTHER_COSTS = 1e-6  # of all but the missing wrench, in the elastic program: which is then the least there is
-MANY = 12  # free coordinates: robots with more are teams
-STEPS = 4  # a motion is rarely that many times as fast as its reference
 
 
 class Row(NamedTuple):
@@ -240,9 +239,6 @@ def swept(scenario: Scenario, mesh: Mesh) -> dict[Limit, ca.Function]:
     thin = [limit for limit in thin if isinstance(limit, BodyOutside) == (scenario.count > MANY)]
     functions = {limit: scenario.limits.on_the_way(limit) for limit in thin}
     return {limit: function for limit, function in functions.items() if function is not None}
-
-
-LEAST = 4  # steps of a phase, where there are enough
 
 
 @dataclass(frozen=True)

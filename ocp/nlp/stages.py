@@ -50,6 +50,7 @@ ACCELERATION = 2  # order of a hull: of lower ones an interval has all points, i
 SLACK_COST = 1e2  # of a missing wrench as large as the weight
 SUPPORT_COST = 1e-8  # of the ground's forces in units of the weight: enough to choose among forces of spare points
 WIND_COST = 1e-2  # of the tensions in the decisive winds of a box, beside the planned ones
+ON_IT = 1e-6  # of the scale of a limit: an end so near to a bound is on it
 
 
 def node_of(
@@ -180,9 +181,6 @@ def _node_cost(scenario: Scenario, layout: Layout, x: ca.SX, cost: ca.SX) -> ca.
         others = scenario.robot.force_scale * x[layout.wind_tensions] / amount
         cost += WIND_COST / layout.winds * ca.sumsqr(others)
     return cost + SUPPORT_COST * ca.sumsqr(x[layout.supports])
-
-
-ON_IT = 1e-6  # of the scale of a limit: an end so near to a bound is on it
 
 
 class Leaving(NamedTuple):

@@ -35,6 +35,7 @@ CERTAIN_FORCE = 1e-6  # of the weight, likewise
 Turned = Callable[[np.ndarray], np.ndarray]
 """Takes offsets from the reference attitude (n, k), and returns poses (n, 6)."""
 Tensions = Callable[[np.ndarray, float], tuple[np.ndarray, np.ndarray]]
+AROUND = 10.0  # of the largest arms: a box around all attachments, towards whose corners pulls span all directions
 """Takes the centres of boxes of offsets (n, k) and half their size [rad]; returns the shortfall of tensions at each
 centre (n,) [N], and a lower bound of their shortfall in the whole box (n,) [N]."""
 
@@ -180,9 +181,6 @@ def _tensions_at_rest(scenario: Scenario, time: float, carriers: np.ndarray, tur
         winds = [wind[0] for wind in possible_winds_at(scenario.wind_set, robot, turned(middle), np.zeros((1, 6)))]
         winds.sort(key=lambda wind: -float(short_in(wind, middle, 0.0)[0][0]))
     return short
-
-
-AROUND = 10.0  # of the largest arms: a box around all attachments, towards whose corners pulls span all directions
 
 
 def out_of_reach(

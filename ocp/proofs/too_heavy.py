@@ -25,6 +25,10 @@ from ..tasks.scenario import Scenario
 
 OF_WEIGHT = ("t_max", "thrust_max")  # limits that are too small together
 CERTAIN = 1e-6  # of the weight
+OF_DURATION = "duration"
+DIRECTIONS = np.linspace(-np.pi / 2, np.pi / 2, 181)  # above the horizontal, in the vertical plane of the force
+TINY = 1e-300  # [N]: a vertical force has no direction ahead; shorter vectors in its place bound no less
+HALVINGS = 30  # of the range of durations
 
 
 class _Span(NamedTuple):
@@ -85,12 +89,6 @@ def _spans(scenario: Scenario, rests: np.ndarray) -> Iterator[_Span]:
             loads = [each.load for each in phases[first : index + 1]]
             if begins[0] and ends[0] and all(np.array_equal(loads[0], load) for load in loads):
                 yield _Span(phases[first].start, phase.end, float(loads[0][0]), bool((begins & ends).all()))
-
-
-OF_DURATION = "duration"
-DIRECTIONS = np.linspace(-np.pi / 2, np.pi / 2, 181)  # above the horizontal, in the vertical plane of the force
-TINY = 1e-300  # [N]: a vertical force has no direction ahead; shorter vectors in its place bound no less
-HALVINGS = 30  # of the range of durations
 
 
 class Carrier(NamedTuple):

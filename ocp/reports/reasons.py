@@ -23,6 +23,9 @@ from ..warnings.values import OTHER_WAY, READS
 CLOSE = 1e-3  # relative difference of a duration from the shortest allowed
 NEARLY_ALL = 0.9  # of the cost of a plan: from here on a minimum of the cost is one of the time
 LOADS = "any within their tolerances; the tensions shown are those with the loads as given"
+LEVEL = 1e-3  # [rad]: of a smaller attitude nothing is said
+TO_MOVE = 1.5  # times what carries the weight: tilted thrust and acceleration need more
+FELT = 0.02  # of the weight: a wind with less force is hardly why tensions are missing
 
 
 def motion_facts(plan: PlanData) -> list[Fact]:
@@ -105,9 +108,6 @@ def _task_wind(task: Task) -> str:
         box = task.wind
         return f"any from {wind(box.min)} to {wind(box.max)}; the tensions shown are those in {wind(box.middle)}"
     return "" if task.wind is None else wind(task.wind)
-
-
-LEVEL = 1e-3  # [rad]: of a smaller attitude nothing is said
 
 
 def reasons(plan: PlanData) -> list[Fact]:
@@ -199,10 +199,6 @@ def in_phase(plan: PlanData, time: float | None) -> str:
 def up(plan: PlanData) -> np.ndarray:
     """Return the direction against gravity in {G}, (3,)."""
     return -np.array(plan.scenario.robot.gravity)
-
-
-TO_MOVE = 1.5  # times what carries the weight: tilted thrust and acceleration need more
-FELT = 0.02  # of the weight: a wind with less force is hardly why tensions are missing
 
 
 def ideas(plan: PlanData) -> list[Fact]:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 from ...figures.limits import Limited
 
 ROUND = np.linspace(0.0, 2 * np.pi, 41)
+INSTANTS = 60  # along the carriers' paths in the views
 
 
 def trajectory(plan: PlanData) -> Contents:
@@ -99,9 +100,6 @@ def _rings(radius: float, axes: np.ndarray) -> list[np.ndarray]:
     """Return three circles about the origin, one across each axis of (3, 3)."""
     pairs = ((axes[1], axes[2]), (axes[2], axes[0]), (axes[0], axes[1]))
     return [radius * (np.cos(ROUND)[:, None] * u + np.sin(ROUND)[:, None] * v) for u, v in pairs]
-
-
-INSTANTS = 60  # along the carriers' paths in the views
 
 
 def drawings(plan: PlanData, trajectory: xr.Dataset) -> dict[str, Drawing]:

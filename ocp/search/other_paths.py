@@ -22,6 +22,15 @@ from .search import Search
 STEP = 1.3  # ratio of successive shifts
 SHIFTS = STEP ** np.arange(-36, 3)  # in parts of the robot's size
 HALVINGS = 5
+LEAST = 0.05  # of a path: with less, other changes are better advice
+MOST_NAMED = 5  # points of a smaller path that its advice gives
+PLACES = 31  # of a path, at which a shifted one is compared
+YAWS = np.deg2rad(np.arange(-180, 180, 5))  # that are tried
+WIDER = 0.05  # of the distance of a given state from its path, at which almost nothing is left to choose
+MOST_TILTED = 0.5  # [rad], of a tilt that is offered
+SPARE = 1.01  # times the largest tilt at the nodes
+POINT, POINTS, PATHS = ("start", "end", "pose", "centre"), ("points", "poses"), ("path", "along")
+AnyKind = TypeVar("AnyKind", bound=PathBase)
 
 
 def shortest_shifts(scenario: Scenario, size: float, holds: Callable[[np.ndarray], bool]) -> Iterator[np.ndarray]:
@@ -39,17 +48,6 @@ def shortest_shifts(scenario: Scenario, size: float, holds: Callable[[np.ndarray
                 low, high = (low, middle) if holds(middle * way) else (middle, high)
             found.append((high, way))
         yield from (high * way for high, way in sorted(found, key=lambda pair: pair[0]))
-
-
-LEAST = 0.05  # of a path: with less, other changes are better advice
-MOST_NAMED = 5  # points of a smaller path that its advice gives
-PLACES = 31  # of a path, at which a shifted one is compared
-YAWS = np.deg2rad(np.arange(-180, 180, 5))  # that are tried
-WIDER = 0.05  # of the distance of a given state from its path, at which almost nothing is left to choose
-MOST_TILTED = 0.5  # [rad], of a tilt that is offered
-SPARE = 1.01  # times the largest tilt at the nodes
-POINT, POINTS, PATHS = ("start", "end", "pose", "centre"), ("points", "poses"), ("path", "along")
-AnyKind = TypeVar("AnyKind", bound=PathBase)
 
 
 def nearer_end(scenario: Scenario) -> Change | None:

@@ -32,6 +32,13 @@ TIGHTENED = 1.1  # times what the audit reports, on the same mesh
 LARGEST_SHARE = 0.2  # of a limit, for what one audit reports
 
 Shares: TypeAlias = tuple[tuple[str, str, float], ...]
+DIGITS = 4  # of what is offered: reports print no more
+# Effort of all programs of offers, as iterations times free coordinates at their nodes: what the plan took, within
+# these bounds, of a few seconds.
+LEAST_EFFORT, MOST_EFFORT = 8e4, 1.2e5
+PART = 0.6  # of the remaining effort, for one program
+LEAST_ITERATIONS = 15  # fewer find nothing
+LARGE, FEWEST = 600, 20  # free coordinates at all nodes of a mesh, and its steps
 """Name of a limit, what it is about, and the share by which it is reduced (`Mesh.further`)."""
 
 
@@ -151,15 +158,6 @@ def _tightened(scenario: Scenario, audit: Audit, before: Shares, factor: float =
                 share = max(own, default=0.0) + factor * limit.share_beyond(value)
                 shares[excess.limit, excess.about] = min(share, LARGEST_SHARE)
     return tuple((*key, share) for key, share in shares.items())
-
-
-DIGITS = 4  # of what is offered: reports print no more
-# Effort of all programs of offers, as iterations times free coordinates at their nodes: what the plan took, within
-# these bounds, of a few seconds.
-LEAST_EFFORT, MOST_EFFORT = 8e4, 1.2e5
-PART = 0.6  # of the remaining effort, for one program
-LEAST_ITERATIONS = 15  # fewer find nothing
-LARGE, FEWEST = 600, 20  # free coordinates at all nodes of a mesh, and its steps
 
 
 def planned(search: Search, scenario: Scenario, name: str, guess: Deviation | None = None) -> Plan | None:

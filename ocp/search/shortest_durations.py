@@ -29,6 +29,8 @@ from ..timing.time_along import time_along
 from ..timing.timed_task import WITHOUT_POWER
 
 BOUND = 0.99  # of the fastest law's time on its grid: no law is faster than this
+LEAST = LEAST_INSTANTS / AUDIT_RATE  # [s], that a phase may last
+CLOSE = 1e-3  # relative: from the shortest duration that is feasible
 
 
 class PathTiming:
@@ -84,10 +86,6 @@ def audit_of_law(law: Plan, scenario: Scenario) -> Audit | None:
     """Return the audit of the fastest law if it is one of all limits of the scenario, else None."""
     task = scenario.task.model_copy(update={"path": law.scenario.task.path, "duration": None})
     return law.audit if task == law.scenario.task else None
-
-
-LEAST = LEAST_INSTANTS / AUDIT_RATE  # [s], that a phase may last
-CLOSE = 1e-3  # relative: from the shortest duration that is feasible
 
 
 class Chosen(NamedTuple):

@@ -36,6 +36,14 @@ from ..tasks.task import MotionStatus, Task
 PLACES = 41
 PLANES = 10  # rounds in which the tangent planes of all cables are added
 TINY = 1e-300  # [N]
+ROUNDS = 8  # after the plan for the robot of the file; two suffice as a rule
+GROWTH = 1.05  # of what limits are tightened by: the next plan's tensions may be larger
+AT_ONCE = 4096  # instants
+MOST_OF_CURVE = 2000  # instants for the lengths of the curves
+HALVINGS = 3  # of what limits are tightened by, for offers
+FEWEST = 50  # [%] of the robots: plans for fewer are not offered
+LEAST_ERRORS = 5  # [%] of the given ones: smaller ones are not offered
+Climb = Callable[[Scenario, Deviation | None], Plan]
 
 
 def too_uncertain(scenario: Scenario, share: float) -> list[Excess]:
@@ -81,15 +89,6 @@ def too_uncertain(scenario: Scenario, share: float) -> list[Excess]:
     return worst
 
 
-ROUNDS = 8  # after the plan for the robot of the file; two suffice as a rule
-GROWTH = 1.05  # of what limits are tightened by: the next plan's tensions may be larger
-AT_ONCE = 4096  # instants
-MOST_OF_CURVE = 2000  # instants for the lengths of the curves
-HALVINGS = 3  # of what limits are tightened by, for offers
-FEWEST = 50  # [%] of the robots: plans for fewer are not offered
-LEAST_ERRORS = 5  # [%] of the given ones: smaller ones are not offered
-
-Climb = Callable[[Scenario, Deviation | None], Plan]
 """Plans a scenario from a start."""
 
 

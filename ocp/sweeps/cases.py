@@ -25,6 +25,7 @@ from ..tasks.task import Task, read_task
 from .axis import Axis
 
 CUT = "cut"  # as a cable's t_max: the robot is without this cable
+FAILED = "failed"  # the status of a plan that ended with an error, besides those of `MotionStatus`
 
 
 def _data_of(task: Task) -> dict[str, Any]:
@@ -141,9 +142,6 @@ class Cases:
         """Return the unit of each varied field; empty without a unit."""
         robot, task = self.case(0)
         return tuple(axis.field.unit(robot if axis.field.of_robot else task) for axis in self.axes)
-
-
-FAILED = "failed"  # the status of a plan that ended with an error, besides those of `MotionStatus`
 
 
 class Row(NamedTuple):

@@ -25,6 +25,11 @@ from .scenario import ATTITUDE, POSITION, Scenario
 from .task import FreeBase, GivenBase, HoldBase, Task
 from .task_checks import check_scenario, check_task
 
+AGREES = 0.01  # [m, rad], of carriers that stay or move as given: sensors are no better
+AGREES_SPEED = 0.1  # [m/s, rad/s]
+FIELDS = ("pose", "velocity", "carrier_pose", "carrier_velocity", "tensions")
+OF_LIMITS = {"limits", "margin", "base", "phases", "tube"}  # the fields of a task that its limits depend on
+
 
 def carrier_paths(robot: Robot, task: Task) -> dict[int, AnyPath]:
     """Return the carriers' reference paths by the index of the carrier; the others stay at home.
@@ -52,11 +57,6 @@ def carrier_paths(robot: Robot, task: Task) -> dict[int, AnyPath]:
             raise InputError(f"{field}.{name}.frame must be world, got {path.frame!r}")
         paths_by_index[names.index(name)] = path
     return paths_by_index
-
-
-AGREES = 0.01  # [m, rad], of carriers that stay or move as given: sensors are no better
-AGREES_SPEED = 0.1  # [m/s, rad/s]
-FIELDS = ("pose", "velocity", "carrier_pose", "carrier_velocity", "tensions")
 
 
 class Measured(Protocol):
@@ -134,9 +134,6 @@ def _agree(measured: np.ndarray, given: np.ndarray, name: str, coordinate: int) 
                 f"the task prescribes, got {value:g}"
             )
     measured[:] = given
-
-
-OF_LIMITS = {"limits", "margin", "base", "phases", "tube"}  # the fields of a task that its limits depend on
 
 
 def lay_out(

@@ -23,6 +23,9 @@ from .task import Task
 from .wind_set import WindBox, WindDisc
 
 FREE = 1e-6  # weight of support forces beside tensions: cables carry only what the ground cannot
+LEAST_STEPS = 4  # of a phase
+LEAST_INSTANTS = 10  # of the audit, in a phase
+BALANCED = 1e-9  # of the wrench: what supports miss of it
 
 
 def end_tensions(scenario: Scenario, phase: LaidPhase, end: int) -> np.ndarray | None:
@@ -90,11 +93,6 @@ def support_forces(scenario: Scenario, columns: np.ndarray, wrenches: np.ndarray
         for row in negative:
             forces[row] = nnls(S, targets[row])[0]
     return forces, np.linalg.norm(targets - forces @ S.T, axis=1)
-
-
-LEAST_STEPS = 4  # of a phase
-LEAST_INSTANTS = 10  # of the audit, in a phase
-BALANCED = 1e-9  # of the wrench: what supports miss of it
 
 
 def lay_out_phases(scenario: Scenario) -> Phases:

@@ -21,6 +21,8 @@ from ...models.shapes import AnyBody
 from .paths import RestPath, SequencePath, SinglePath
 from .paths.sequence import Piece, check_continuity, lasting
 
+SAME_TIME = 1e-9  # of the duration: an instant so near to the start of a phase belongs to it
+
 
 class Load(RigidLoad):
     """A rigid body that is fixed to the platform, in addition to the platform of the robot's file."""
@@ -120,9 +122,6 @@ def path_of(phases: Sequence[Phase]) -> SequencePath:
     check_continuity(joined, "phases", [k for k, phase in enumerate(phases) if phase.ground is not None])
     parts = tuple(Piece(path=path, duration=seconds) for path, seconds in joined)
     return SequencePath(kind="sequence", frame=joined[0][0].frame, parts=parts)
-
-
-SAME_TIME = 1e-9  # of the duration: an instant so near to the start of a phase belongs to it
 
 
 @dataclass(frozen=True, eq=False)

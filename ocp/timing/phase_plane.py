@@ -21,6 +21,10 @@ FLAT = 1e-9  # relative: a wrench that lies so near to the span of the cables li
 
 
 Rows = tuple[np.ndarray, np.ndarray, np.ndarray]  # a, b and c of half-planes a u + b x + c <= 0, (N, K) each
+RESERVE = 1e-7  # of the weight, kept from the tension limits against rounding
+MOST_CUTS = 24  # times that half-planes of motors are added
+SETTLED = 1e-3  # of the largest (ds/dt)^2: if it changes by no more, the tangents of powers are those of the law
+SLOWER = 0.25  # times (ds/dt)^2, where tangents exclude all laws
 
 
 def joined(rows: Rows, others: Rows, chosen: np.ndarray | slice = slice(None)) -> Rows:
@@ -241,12 +245,6 @@ def _check_span(s: np.ndarray, wrench: Wrench, available: Facets) -> None:
                 f"path must need only wrenches in the span of the cables, got one outside at s = {s[at]:.4g}, where "
                 f"the wrench matrix has rank {rank} of {n}"
             )
-
-
-RESERVE = 1e-7  # of the weight, kept from the tension limits against rounding
-MOST_CUTS = 24  # times that half-planes of motors are added
-SETTLED = 1e-3  # of the largest (ds/dt)^2: if it changes by no more, the tangents of powers are those of the law
-SLOWER = 0.25  # times (ds/dt)^2, where tangents exclude all laws
 
 
 class Piece(NamedTuple):

@@ -18,6 +18,12 @@ from typing_extensions import override
 
 from ...base.quiet import quiet
 
+STEEPNESS = 1e-4  # of the largest row along u; toppra drops 1e-8 of x at each step, which must be little beside x
+UNLIMITED = 1e7  # x in toppra's units that no limit has stopped; its own bounds are at 1e8
+ROUNDING = 1e-12  # of a row along u: less is zero
+TOGETHER = 16  # half-planes that toppra takes together: it multiplies them by a dense matrix of twice their number
+FARTHEST = 1e9  # u and x in toppra's units; a limit beyond does not count
+
 
 class _LateModule(ModuleType):
     """A module whose names come from the real one, which is imported with the first of them."""
@@ -54,12 +60,6 @@ with imported_late("matplotlib", "pyplot"):  # toppra draws with it if asked to;
     from toppra.constraint import LinearConstraint
     from toppra.constraint.linear_constraint import canlinear_colloc_to_interpolate
     from toppra.interpolator import AbstractGeometricPath
-
-STEEPNESS = 1e-4  # of the largest row along u; toppra drops 1e-8 of x at each step, which must be little beside x
-UNLIMITED = 1e7  # x in toppra's units that no limit has stopped; its own bounds are at 1e8
-ROUNDING = 1e-12  # of a row along u: less is zero
-TOGETHER = 16  # half-planes that toppra takes together: it multiplies them by a dense matrix of twice their number
-FARTHEST = 1e9  # u and x in toppra's units; a limit beyond does not count
 
 
 class Rows(NamedTuple):

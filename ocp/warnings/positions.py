@@ -18,6 +18,17 @@ from ..limits.limits import Limits
 from ..limits.places import CarriersOutside, PlatformOutside, body_outside
 from ..tasks.paths import PathBase, WaypointPath
 
+LEAST = 1e-4  # [m]: less is within the tolerances of a program
+Limited = Callable[[Sequence[Limit]], list[np.ndarray]]
+Meeting = tuple[float, str]  # by how much [m], and the sentence
+MOST = 200  # instants that are looked at, or less than twice as many
+ENTERED = 1e-3  # [m]: less inside is not worth a sentence
+NEAR = 1e-3  # [m], and of the size of the frame, whichever is less: nearer than this it is inside
+FLAT = 0.1  # of the largest span of the anchors: an axis along which they span less has no sides
+AXES = "xyz"
+LEFT = 1e-3  # of the span of the points
+LEAVES = "the platform leaves the frame of the robot"
+
 
 @dataclass(frozen=True)
 class Instants(Displayed):
@@ -42,13 +53,6 @@ class Instants(Displayed):
     def platform(self) -> np.ndarray:
         """Return the CoM of the platform and its attachments, (n, 1 + m, 3) [m]."""
         return points.placed(self.pose, np.vstack([self.robot.platform.com, self.robot.attachments]))
-
-
-LEAST = 1e-4  # [m]: less is within the tolerances of a program
-Limited = Callable[[Sequence[Limit]], list[np.ndarray]]
-Meeting = tuple[float, str]  # by how much [m], and the sentence
-MOST = 200  # instants that are looked at, or less than twice as many
-ENTERED = 1e-3  # [m]: less inside is not worth a sentence
 
 
 def into_places(seen: Instants, limits: Iterable[Limit], limited: Limited) -> list[str]:
@@ -129,13 +133,6 @@ def between_points(seen: Instants, limits: Iterable[Limit], limited: Limited) ->
             sentence = f"{limit.called!r} passes between the points of the platform: it is {deep} inside the hull of "
             meetings.append((-float(its.min()), f"{sentence}its centre of mass and attachments at t = {when:.3f} s"))
     return _worst(meetings, "a platform.body in the robot's file would keep it out")
-
-
-NEAR = 1e-3  # [m], and of the size of the frame, whichever is less: nearer than this it is inside
-FLAT = 0.1  # of the largest span of the anchors: an axis along which they span less has no sides
-AXES = "xyz"
-LEFT = 1e-3  # of the span of the points
-LEAVES = "the platform leaves the frame of the robot"
 
 
 class Side(NamedTuple):

@@ -39,6 +39,13 @@ LEAST_SPREAD = 4e-4  # of the anchors' spread: attachments that are nearer toget
 SLOWEST = 5e-5  # of the speed after a fall from the height of the robot: no motion has a smaller mean speed
 PLACES = 101  # along a path, for its length
 _UNIT = re.compile(r"\[([^\]]+)\]")  # in the description of a field
+SHORT = 0.05  # of a cable's length at home
+SLACK = -1e-6  # of the weight: less tension than that is slack
+SHORT_OF_WHOLE = 1e-3  # [rad], by which a turn must be less than a whole one, which is meant
+OTHER_WAY = "the other way to the same attitude"
+WEAK = 0.05  # of the smallest singular value at home
+LEAST_SHARE = 1e-4  # smaller shares are reported as less than this
+SMALLER = 0.3  # of the formation, as advice
 
 
 class _Number(NamedTuple):
@@ -195,10 +202,6 @@ def _durations(robot: Robot, task: Task) -> Iterator[_Suspect]:
             yield _Suspect(key, part.duration, "large" if part.duration > most else "small", "s", named)
 
 
-SHORT = 0.05  # of a cable's length at home
-SLACK = -1e-6  # of the weight: less tension than that is slack
-
-
 def short_cables(seen: Instants) -> list[str]:
     """Return a sentence if cables get shorter than `SHORT` of their length at home; none if their lengths are fixed."""
     robot = seen.robot
@@ -249,10 +252,6 @@ def fixed_cables(seen: Instants, tensions: np.ndarray) -> list[str]:
     ]
 
 
-SHORT_OF_WHOLE = 1e-3  # [rad], by which a turn must be less than a whole one, which is meant
-OTHER_WAY = "the other way to the same attitude"
-
-
 def long_turns(path: PathBase) -> list[str]:
     """Return a sentence for each angle of a line, also of a part of a sequence, that turns the longer way."""
     if isinstance(path, SequencePath):
@@ -267,11 +266,6 @@ def long_turns(path: PathBase) -> list[str]:
             other = f"{OTHER_WAY}, to a {name} of {quantity(start + short, 'rad', digits=6)}, is {least}"
             found.append(f"the line turns by {turns} in {name}; {other}")
     return found
-
-
-WEAK = 0.05  # of the smallest singular value at home
-LEAST_SHARE = 1e-4  # smaller shares are reported as less than this
-SMALLER = 0.3  # of the formation, as advice
 
 
 def weak_formation(seen: Instants, formation: float | None = None) -> list[str]:

@@ -28,6 +28,9 @@ LOOKS, BETWEEN = 8, 1.002  # in each of them, between which the curvature may be
 BLOCK = 20_000  # places of corners that are computed together: more would take memory, not less time
 MOST = 0.5  # of the shorter line at a corner
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+SAME = 1e-12  # [rad]
+STEADY, LOOKS = 0.02, 20_001  # of the feed; instants at which the speed is looked at
+SHORTEST = 1e-12  # of the length: a shorter piece has no nodes
 
 
 class Places(NamedTuple):
@@ -136,11 +139,6 @@ class RoundedCorners:
         degree = 5 - order
         weights = [comb(degree, k) * share**k * (1 - share) ** (degree - k) for k in range(degree + 1)]
         return np.einsum("kn,nkj->nj", np.array(weights), self._control[order][corner])
-
-
-SAME = 1e-12  # [rad]
-STEADY, LOOKS = 0.02, 20_001  # of the feed; instants at which the speed is looked at
-SHORTEST = 1e-12  # of the length: a shorter piece has no nodes
 
 
 class FeedPath(PathBase):

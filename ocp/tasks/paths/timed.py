@@ -16,6 +16,7 @@ from .samples import SamplePath
 from .waypoints import WaypointPath
 
 SLOW = 1e-6  # of the largest speed: so slow is at rest
+Curve: TypeAlias = Annotated[RestPath | LinePath | CirclePath | WaypointPath | SamplePath, Field(discriminator="kind")]
 
 
 class TimeLaw:
@@ -121,7 +122,6 @@ class SmoothedLaw:
         return sums + np.maximum(times - knots[-1], 0.0), s, np.where(times == inside, speed, 0.0)
 
 
-Curve: TypeAlias = Annotated[RestPath | LinePath | CirclePath | WaypointPath | SamplePath, Field(discriminator="kind")]
 """A path of any kind but `timed`."""
 
 

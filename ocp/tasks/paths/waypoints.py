@@ -26,6 +26,15 @@ from .legs import Legs
 
 NEAREST = 1e-6  # of the length of all steps together: nearer points make a spline turn wildly
 STILL = np.zeros(6)
+LOOKS = 2001  # at the box of the points
+SAME = 1e-12  # [rad], of an attitude after whole turns
+GIMBAL = 0.05  # [rad] from a pitch of 90 degrees
+GONE = {
+    "smooth": "write 'shape: spline' for a smooth curve through the points, or nothing for straight legs",
+    "uniform": "write nothing, for straight legs, which `towline time` takes at any speed",
+}
+MOST = 12  # inner points, for which all subsets are 4096
+SHORTER = 1e-9  # relative: of two orders with so little between them the given one stays; of shares: rounding
 
 
 class WaypointSpline:
@@ -80,16 +89,7 @@ class WaypointSpline:
         return Motion(self._curve(s), *(moving * self._curve(s, k) / last**k for k in (1, 2)))
 
 
-LOOKS = 2001  # at the box of the points
-SAME = 1e-12  # [rad], of an attitude after whole turns
-GIMBAL = 0.05  # [rad] from a pitch of 90 degrees
-GONE = {
-    "smooth": "write 'shape: spline' for a smooth curve through the points, or nothing for straight legs",
-    "uniform": "write nothing, for straight legs, which `towline time` takes at any speed",
-}
 _legs, _spline = lru_cache(maxsize=64)(Legs), lru_cache(maxsize=64)(WaypointSpline)
-MOST = 12  # inner points, for which all subsets are 4096
-SHORTER = 1e-9  # relative: of two orders with so little between them the given one stays; of shares: rounding
 
 
 class WaypointPath(PathBase):
