@@ -220,7 +220,14 @@ class Windows:
             from scipy.interpolate import CubicSpline
 
             even = smooth(of.times, values, self._neighbours) if self.measured_command else values
-            self._signal = CubicSpline(of.times, even)
+            spline = CubicSpline(of.times, even)
+
+            def extended(at: np.ndarray) -> np.ndarray:
+                """Return lengths at times that a delay may shift beyond the recording, where cubics would diverge."""
+                near = at.clip(of.times[0], of.times[-1])
+                return spline(near) + spline(near, 1) * (at - near)[..., None]
+
+            self._signal = extended
         dynamics = dynamics_of(self.robot)
         lengths = np.asarray(dynamics.cable_lengths(self._platform[0], carriers))
         self._cable_speed = np.gradient(lengths, self._dt, axis=1)

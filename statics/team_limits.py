@@ -14,10 +14,12 @@ from ..models.trajectory import Motion
 from .winch_forces import largest_forces
 
 ACCEPTED = 2e-3  # of a limit's range: what differences of a plan's motion may seem to exceed it by
+UNDERSHOOT = 0.1  # of a smallest tension: the same for tensions, so that no cable pushes
 ROUNDING = 1e-6  # of a limit's range
 # Of second differences: what values reach beyond those at instants, at most. Poses are parabolas between instants;
 # accelerations oscillate where the jerk jumps, since they are differences, and so do forces.
 OF_POSES, OF_FORCES = 1 / 8, 1.0
+LINEAR = 0.0  # the same of tensions, which are linear between instants
 LACKING = 0.01  # of the largest tension: a force that no actuator gives
 
 
@@ -71,14 +73,17 @@ def excess_of(rows: list[Row], begins_inside: bool = True, of_plan: bool = False
     """Return how far limits are exceeded, (k, d, n), relative to their ranges.
 
     Unless a stop should begin inside, so much as it has first is no excess. What is undefined is infinitely much. The
-    motion `of_plan` itself has been audited between its instants, and limits stay as they are for several durations.
+    motion `of_plan` itself has been audited between its instants. Values between instants are not estimated for several
+    durations.
     """
-    low, high = np.array([row[2:4] for row in rows]).T[..., None, None]  # (k, 1, 1) each
+    low, high, between = np.array([row[2:] for row in rows]).T[..., None, None]  # (k, 1, 1) each
+    of_tensions = np.minimum(ACCEPTED, UNDERSHOOT * low / _range(low, high) + ROUNDING)
+    accepted = np.where(between == LINEAR, of_tensions, ACCEPTED) if of_plan else ROUNDING
     least, most = _reached(rows, of_plan)
     floor = low if begins_inside else np.minimum(low, least[..., :1])
     ceiling = high if begins_inside else np.maximum(high, most[..., :1])
     beyond = np.where(np.isnan(most), np.inf, np.maximum(floor - least, most - ceiling) / _range(low, high))
-    return np.where(beyond > (ACCEPTED if of_plan else ROUNDING), beyond, 0.0)
+    return np.where(beyond > accepted, beyond, 0.0)
 
 
 def worst_of(rows: list[Row], times: np.ndarray, of_plan: bool = False) -> tuple[float, str]:
@@ -141,7 +146,7 @@ def limits_of(
     tilts, ranges = np.arccos(np.clip(R[..., 2, 2], -1, 1)), zip(robot.t_min, robot.t_max, strict=True)
     rows = list[Row]()
     for i, (low, high) in enumerate(ranges):
-        rows.append(Row(f"tension {i + 1}", tensions[..., i], low, high, 0.0))  # linear between instants
+        rows.append(Row(f"tension {i + 1}", tensions[..., i], low, high, LINEAR))
     if windings is not None:
         most = enumerate(largest_forces(robot))
         rows += [

@@ -12,6 +12,7 @@ from towline.control.trajectory import read_trajectory
 from towline.models import points
 from towline.models.trajectory import Trajectory
 from towline.statics.continuation import continued
+from towline.statics.team_limits import LINEAR, Row, worst_of
 from towline.statics.team_stops import team_stop_along
 
 from .robots_hooked_below import hooked_below
@@ -76,6 +77,14 @@ def test_no_stop_of_a_plan_with_room_exceeds_accelerations_between_its_instants(
         fine = read_trajectory(tight, halt, None).at(np.linspace(0, halt.duration, 4001)[:-1])[1]
         assert np.linalg.norm(fine[2][..., :3], axis=-1).max() <= most
         assert (its.tensions >= robot.t_min).all()
+
+
+def test_no_cable_pushes_in_the_rest_of_a_plan():
+    """Other limits may seem to be exceeded by 0.2 % of their range, which may be more than the smallest tension."""
+    times, pulls, bounds = np.array([0.0, 0.1, 0.2]), np.array([[0.3, -0.05, 0.3]]), (0.1, 100.0)
+    assert worst_of([Row("tension 1", pulls, *bounds, LINEAR)], times, True)[1] == "tension 1: -0.05 of 0.1 at 0.1 s"
+    assert not worst_of([Row("tension 1", pulls + 0.145, *bounds, LINEAR)], times, True)[1]
+    assert not worst_of([Row("torque", pulls, *bounds)], times, True)[1]
 
 
 def test_a_team_stops_in_a_simulation(made):

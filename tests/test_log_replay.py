@@ -283,6 +283,16 @@ def test_commanded_lengths_cut_no_corners_between_samples(tmp_path):
     assert not result.named
 
 
+def test_commands_before_a_recording_are_extended_by_lines(tmp_path):
+    """A delay of 0.15 s needs those of 0.1 s before the first. Cubics through rounded ones were 0.5 m off."""
+    rows, orders = np.arange(600, 2740, 10), motion("lengths")[1]["lengths_commanded"].values
+    found = columns("lengths", rows) | {f"l{i}_cmd [m]": one for i, one in enumerate(orders[rows + 150].T.round(3))}
+    windows = replay(PLANAR, written(tmp_path / "late.csv", found), delay=0.15).residuals["position"]
+    first, *others = np.sqrt(np.nanmean(windows**2, axis=(1, 2)))
+    assert first < 0.02
+    assert max(others) < 5e-3
+
+
 def test_a_thrust_that_is_recorded_too_low_is_no_mass(tmp_path):
     found = columns("thrusts", every("thrusts"))
     found["quad2_thrust [N]"] = 0.93 * found["quad2_thrust [N]"]

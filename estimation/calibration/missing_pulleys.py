@@ -57,7 +57,7 @@ def missing_pulleys(solved: Solved) -> MissingPulleys | None:
         of, state = of.only(rows), state.only(rows)
     tried = {text: _likeliest(solved, of, state, robot) for text, robot in _with_pulleys(of.robot).items()}
     likely = max(gain for gain, _, _ in tried.values())
-    if likely < CERTAIN:
+    if not likely >= CERTAIN:  # or nan
         return None
     tried = {text: one for text, one in tried.items() if one[0] > max(likely - CERTAIN, 0.0)}
     scale = metric(of)[of.parameters.varies]

@@ -137,7 +137,7 @@ def _of_noise(result: CalibrationData) -> list[str]:
         size = f"wrong by {_mm(result.prior[end])}" if end in result.prior else "exact"
         what = "the frame of the poses" if frame == "frame" else "the measured body"
         if frame == "body" and frame in result.free and result._solved.model.size_is_open:
-            found = "the sensor of the orientations looks mounted askew (body.turn corrects it)"
+            found = "the sensor of orientations may be mounted askew (body.turn is the correction)"
         elif frame in result.free:
             found = f"{what} was found from the file's {end}, which are assumed to be {size}"
         elif end in result.prior:
