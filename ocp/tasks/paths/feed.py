@@ -24,7 +24,7 @@ CELLS = 16  # of a corner, in each of which the curvature is bounded
 NEAR_END = 0.17  # place of the second control point, as a share of the way from the end of a corner to its tip
 # The third one, by the turn [rad]: with it the peak of the curvature is the least for a given miss, within 1 %.
 TURNS, NEAR_TIP = (0.0, pi / 4, pi / 2, 3 * pi / 4, pi), (0.78, 0.71, 0.61, 0.43, 0.2)
-LOOKS, BETWEEN = 8, 1.002  # in each of them, between which the curvature may be so many times as large
+IN_CELL, BETWEEN = 8, 1.002  # places in each cell, between which the curvature may be so many times as large
 BLOCK = 20_000  # places of corners that are computed together: more would take memory, not less time
 MOST = 0.5  # of the shorter line at a corner
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
@@ -75,9 +75,9 @@ class RoundedCorners:
         self.lengths = np.pad(
             np.cumsum(speed.reshape(-1, CELLS, len(_NODES)) @ _WEIGHTS / 2 / CELLS, axis=1), ((0, 0), (1, 0))
         )
-        speed, crossed = self._sizes(np.linspace(0.0, 1.0, CELLS * LOOKS + 1))
+        speed, crossed = self._sizes(np.linspace(0.0, 1.0, CELLS * IN_CELL + 1))
         curvature = np.divide(crossed, speed**3, out=np.zeros_like(speed), where=speed > 0)
-        cells = np.arange(CELLS)[:, None] * LOOKS + np.arange(LOOKS + 1)  # with both ends
+        cells = np.arange(CELLS)[:, None] * IN_CELL + np.arange(IN_CELL + 1)  # with both ends
         self.curvature = BETWEEN * curvature[:, cells].max(axis=2)
         straight = long - np.append(0.0, cut) - np.append(cut, 0.0)
         pieces = np.zeros(2 * len(long) - 1)
