@@ -21,7 +21,7 @@ def missing(robot, audited):
 
 @pytest.mark.parametrize("name", ["circle", "helix", "pitching"])
 def test_paper_f_motions_are_planned(name):
-    robot, task = load("wang-flying"), getattr(flying_plans, name)()
+    robot, task = load("wang-flying"), getattr(flying_plans, f"{name}_task")()
     found = plan(robot, task)
     assert found.feasible, found.report()
     seen = found.audit
