@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from towline import InputError, Measurements, load, read_measurements
 from towline.estimation.calibration import attitudes, calibrate
+from towline.estimation.calibration.balance import needs_balance
 from towline.estimation.calibration.enough import usual
 from towline.estimation.calibration.geometry import length_of
 from towline.estimation.calibration.plausibility import mistake
@@ -162,6 +163,16 @@ def test_positions_alone_show_scales_of_drums_and_wrong_readings(tmp_path):
     assert all(abs(one.value - 1.02) < 4 * one.sigma for one in scales)
     assert max(one.sigma for one in scales) < 2e-3
     assert "anchors are" not in result.report()  # farther apart or closer together than in the file
+
+
+def test_load_cells_do_not_make_a_calibration_by_positions_one_of_forces(tmp_path):
+    """Four lengths tell how a planar platform of known position is turned; a few missing positions change nothing."""
+    robot, _ = user.planar(tmp_path, 3)
+    read = read_measurements(tmp_path / "planar.csv", robot=robot)
+    poses, most, tensions = read.poses.copy(), read.poses.copy(), np.full(read.lengths.shape, 50.0)
+    poses[30:33], most[:31] = np.nan, np.nan
+    for known, wanted in ((read.poses, False), (poses, False), (most, True)):
+        assert needs_balance(load(robot), read.changed(poses=known, tensions=tensions)) == wanted
 
 
 def test_positions_alone_have_input_errors_too(tmp_path):

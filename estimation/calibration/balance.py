@@ -392,6 +392,6 @@ def needs_balance(robot: Robot, measurements: Measurements) -> bool:
     if measurements.directions is not None:  # which tell more, also in motion
         return False
     moves, known = robot.dof_mask > 0, measured_poses(robot, measurements)[2]
-    placed = known[:, :3][:, moves[:3]].all()  # so lengths tell how the platform is turned
+    placed = known[:, :3][:, moves[:3]].all(axis=1).mean() > 0.5  # so lengths tell how the platform is turned
     few = robot.m < moves.sum() or (measurements.tensions is not None and not placed)
     return bool(few and robot.weight > 0 and not known[:, moves].all())

@@ -52,8 +52,8 @@ def considered(model: Model, state: State, inverse: np.ndarray, excess: float, r
 
     These errors are the file's `uncertainty`, the usual errors of ends that it does not contain, and errors of thrusts
     from which tensions were computed. For parameters of the geometry only errors of anchors on carriers at rest count,
-    because it is estimated relative to the attachments. Forces are not relative to anything, so neither are poses that
-    they determine, and all errors count.
+    because it is estimated relative to the attachments. Forces are not relative to anything, so neither are anchors by
+    poses that they determine, and all errors count.
 
     - `inverse`: pseudo-inverse of the normal matrix of the free parameters, in metres, (p, p).
     - `excess`, `redundancy`: as in `Noise`, of the fit.
@@ -62,7 +62,7 @@ def considered(model: Model, state: State, inverse: np.ndarray, excess: float, r
     varies, in_balance = np.flatnonzero(of.varies), Parameters(model.robot, IN_BALANCE).varies
     of_forces = in_balance[varies[varies < len(in_balance)]]
     of_forces = np.pad(of_forces, (0, len(varies) - len(of_forces)))  # slips are last
-    of_forces |= model.size_is_open and model.balanced is not None
+    of_forces |= "anchors" in of.groups and model.size_is_open and model.balanced is not None
     thrusts = ("gains",) if from_thrusts(of.robot) and model.measurements.tensions is not None else ()
     groups = tuple(name for name in GROUPS if name in (*of.groups, *ENDS, *thrusts))
     stand = model.measurements.carrier_poses is None  # else measurements tell where anchors are, nearly alone
