@@ -106,9 +106,10 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
 
     Args:
         plan: A `Plan`, another object with such a `trajectory`, such a dataset, or the NetCDF file of one.
-        time: Time in the plan at which the stop begins [s]; a time after the plan's end means the end. A plan that ends
-            while the robot moves is continued with its last velocity. Its last acceleration and rotation, and the
-            motion of a team's carriers relative to the platform, fade within a second.
+        time: Time in the plan at which the stop begins [s]; a time after the plan's end means the end. A periodic plan,
+            which ends in the state in which it begins, is repeated. Another that ends while the robot moves is
+            continued with its last velocity. Its last acceleration and rotation, and the motion of a team's carriers
+            relative to the platform, fade within a second.
 
     Returns:
         Stop: `simulate` and `references` take it as they take a plan.

@@ -27,7 +27,6 @@ ALONE = ("delay", "friction", "mass", "stiffness")  # parameters of one number, 
 STEPS, HALVINGS = 4, 3  # of Gauss and Newton, and of a step that is too long
 LEAST = 0.5, 0.1  # share that a parameter of several numbers, or of one by measured poses, must explain to be named
 REMOVED = 0.01  # of the sum of squares, from which on a parameter is named
-NOTHING = 1.0  # of the sum of squares that noise has: less needs no explanation
 DOUBT = 5e-4  # probability, on each side, that a parameter is named which only the scatter of the windows changes
 TIED = 0.1  # of what the best explains: others that explain as much, up to this, are not distinguished from it
 SHOWN = 0.1  # of a parameter (of 0.1 s, a third of the length, a tenth of the tensions): its deviation if not shown
@@ -207,8 +206,8 @@ class Matching:
             # lengths that do not drive the plant have the errors of its poses, of which stiffness explains some.
             indirect = self.windows.recorded.computed or (name == "stiffness" and self.windows.drive == "tensions")
             least = LEAST[int(name in ALONE and not indirect)]
-            named = shown and bool(certainly.any()) and explained > least and removed > REMOVED * whole
-            named = bool(named and whole > NOTHING * count)
+            enough = explained > least and removed > REMOVED * whole and whole > count  # noise needs no explanation
+            named = bool(shown and certainly.any() and enough)
             old, new, sigma = (_plain(one) for one in (before, value, sigma))
             found.append((Explanation(name, old, new, sigma, explained, bool(shown), named), match))
         return sorted(found, key=lambda one: (not one[0].named, not one[0].shown, -weight(one[0])))

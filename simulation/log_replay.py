@@ -84,12 +84,9 @@ class Replay(Drawn, Reported, Displayed):
 
         Outlying windows are included. It is nan if neither positions nor lengths were compared.
         """
-        if "position" in self.residuals:
-            part = self.residuals["position"]
-            sizes = np.sqrt(np.nansum(part**2, axis=-1))[np.isfinite(part).any(axis=-1)]
-        else:
-            sizes = np.abs(self.residuals.get("lengths", np.full(1, np.nan)))
-            sizes = sizes[np.isfinite(sizes)]
+        parts = self.residuals
+        part = parts["position"] if "position" in parts else parts.get("lengths", np.full(1, np.nan))[..., None]
+        sizes = np.sqrt(np.nansum(part**2, axis=-1))[np.isfinite(part).any(axis=-1)]
         return float(np.quantile(sizes, 0.95)) if sizes.size else float("nan")
 
     @property
@@ -113,17 +110,12 @@ class Replay(Drawn, Reported, Displayed):
         late = [one.value for one in self.found if one.name in self.named and one.name == "delay"]
         few = len(windows.starts) <= BLOCK and any(rms > 2 * noise[name] for name, rms in self.rms().items())
         if few and not self.named and not windows.recorded.doubt:
-            return [
-                *windows.notes,
-                f"the windows are too few to name a cause: try some shorter than {windows.window:g} s",
-            ]
+            few_of = f"the windows are too few to name a cause: try some shorter than {windows.window:g} s"
+            return [*windows.notes, few_of]
         if windows.measured_command or not late or not 0.25 * step < late[0] < 0.75 * step:
             return windows.notes
-        held = (
-            "if the controller holds each command until the next, commands act half a sample late: try "
-            f"--delay {step / 2:.3g}"
-        )
-        return [*windows.notes, held]
+        held = "if the controller holds each command until the next, commands act half a sample late: try --delay"
+        return [*windows.notes, f"{held} {step / 2:.3g}"]
 
     @property
     def robot(self) -> Robot:
@@ -243,11 +235,9 @@ class Replay(Drawn, Reported, Displayed):
         kind = f"{windows.drive}, {'measured' if windows.measured_command else 'as commanded'}"
         if windows.recorded.robot.fixed_lengths is not None:
             kind = "thrusts" if windows.commanded else "motion of the carriers"
-        facts = {
-            "commands": kind,
-            "windows": f"{len(windows.starts)} of {quantity(windows.window, 's')}, {counted(outliers, 'outlier')}",
-            "error": f"95 % within {_of('position', self.error)} (tolerance {_of('position', self.tolerance)})",
-        }
+        placed = f"{len(windows.starts)} of {quantity(windows.window, 's')}, {counted(outliers, 'outlier')}"
+        error = f"95 % within {_of('position', self.error)} (tolerance {_of('position', self.tolerance)})"
+        facts = {"commands": kind, "windows": placed, "error": error}
         if self.fitted is not None and self.validation is not None:
             first, (before, after) = self.matching.first.parameters, self.validation
             values = [
@@ -275,11 +265,10 @@ class Replay(Drawn, Reported, Displayed):
             remark = "" if one.named else "no clear reduction" if one.shown else "not determined by this recording"
             if one.name in self.named[1:]:
                 remark = "not distinguishable from the first"
-            if one.name not in ALONE:
-                sigma = ""
-            elif one.name in FACTORS:
+            sigma = ""
+            if one.name in FACTORS:
                 sigma = f"{max(100 * one.sigma, 0.001):.2g} %"
-            else:
+            elif one.name in ALONE:
                 sigma = quantity(1e3 * one.sigma, "ms", 2) if one.name == "delay" else quantity(one.sigma, "N", 2)
             value = _value(one.name, one.value) + (f" +- {sigma}" if sigma else "") if one.shown else "-"
             before = _value(one.name, one.before) if sigma else "-"

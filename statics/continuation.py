@@ -15,18 +15,24 @@ JERK = 20.0  # times the last acceleration and speed, divided by powers of FADED
 FADES = np.array([[1, 0, 0, -10, 15, -6], [0, 1, 0, -6, 8, -3], [0, 0, 0.5, -1.5, 1.5, -0.5]]).T
 OF_ORDER = {order: polyint(FADES, order) if order >= 0 else polyder(FADES) for order in range(-1, 3)}
 POSITION = np.arange(6) < 3  # coordinates of a pose
+CLOSED = 1e-6  # largest difference of the states at both ends of a periodic plan, in SI units
+ENDLESS = 1e6  # [s], duration of a periodic plan that is repeated
 
 
 def continued(trajectory: Trajectory, together: bool) -> Trajectory:
     """Return a trajectory that continues after its end, unless the robot rests there.
 
-    Its last accelerations and rotations fade, and so do the motions of carriers relative to the platform if they stay
-    `together` with it.
+    A periodic one, which ends in the state in which it begins, is repeated. Of others the last accelerations and
+    rotations fade, and so do the motions of carriers relative to the platform if they stay `together` with it.
     """
     end = trajectory.duration or 0.0
     last = trajectory.at(before(end))
     if max(np.abs(motion[1][2]).max() for motion in last) < RESTS:
         return trajectory
+    changes = [[np.diff(part, axis=0)[0] for part in motion] for motion in trajectory.at(np.array([0.0, end]))]
+    gaps = [np.abs([np.where(POSITION, pose, np.sin(pose / 2)), *rates]).max() for pose, *rates in changes]
+    if max(gaps) < CLOSED:
+        return _repeated(trajectory, end, [pose for pose, *_ in changes])
     jerks = [slopes(motion[2])[1] for motion in last]
     for jerk, motion in zip(jerks, last, strict=True):
         for part in (slice(0, 3), slice(3, 6)):
@@ -48,6 +54,22 @@ def continued(trajectory: Trajectory, together: bool) -> Trajectory:
         return first, (a, b, c)
 
     return trajectory._replace(at=at)
+
+
+def _repeated(trajectory: Trajectory, period: float, turns: Sequence[np.ndarray]) -> Trajectory:
+    """Return a periodic trajectory that is repeated; in each period its angles increase by those of `turns` [rad]."""
+    planned = trajectory.tensions
+
+    def complete(times: np.ndarray) -> np.ndarray:
+        return np.maximum(np.ceil(times / period) - 1, 0)
+
+    def at(times: np.ndarray) -> tuple[Motion, Motion]:
+        number = complete(times)
+        (a, b, c), (d, e, f) = trajectory.at(times - period * number)
+        return (a + np.multiply.outer(number, turns[0]), b, c), (d + np.multiply.outer(number, turns[1]), e, f)
+
+    tensions = planned and (lambda times: planned(times - period * complete(times)))
+    return trajectory._replace(duration=ENDLESS, at=at, tensions=tensions)
 
 
 def before(time: float) -> np.ndarray:

@@ -58,6 +58,7 @@ def _unloaded(robot: Robot, trajectory: Trajectory, times: list[float]) -> Itera
             yield Stop(robot, float(tau[0]), float(tau[-1]), time, platform, carriers, tensions, None, limit)
         return
     trajectory = continued(trajectory, together=False)
+    end = min(2 * end, trajectory.duration or 0.0)  # of the period after a periodic plan
     instants = cache(lambda window: instants_of(robot, trajectory, WINDOW * window))  # for all stops and attempts
     bounds = cache(lambda window, reserve: instants(window).bounds(reserve))
     for first in range(0, len(times), AT_ONCE):

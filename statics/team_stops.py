@@ -72,8 +72,7 @@ def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Team
 
     fly = len(carriers_of(robot).flying) == len(robot.carriers)
     end, trajectory = trajectory.duration or 0.0, continued(trajectory, together=fly)
-    last = [motion[1] for motion in trajectory.at(np.array([end]))]
-    rests = max(np.abs(velocity).max() for velocity in last) < RESTS
+    rests = max(np.abs(motion[1]).max() for motion in trajectory.at(np.array([end]))) < RESTS
     left = end - begins if rests else np.inf
     speeds = np.linalg.norm(trajectory.at(np.array([begins]))[1][1][0, :, :3], axis=1)
     braking = speeds / [carrier.motion_limits.acceleration or np.inf for carrier in robot.carriers]  # [s]
@@ -106,8 +105,7 @@ def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Team
 
 def _have_one_each(robot: Robot) -> bool:
     """Return whether all carriers fly, with one cable each."""
-    each = list(range(len(robot.carriers)))
-    return sorted(robot.carrier_of_cable) == each == carriers_of(robot).flying.tolist()
+    return sorted(robot.carrier_of_cable) == carriers_of(robot).flying.tolist() == list(range(len(robot.carriers)))
 
 
 def _give_every_wrench(robot: Robot) -> bool:

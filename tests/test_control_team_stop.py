@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from towline import Dynamics, InputError, Robot, load, plan, simulate
 from towline.control import ComputedTorque, Predictive, Stop, longest_stop, references, stop
@@ -118,6 +119,51 @@ def test_a_stop_beyond_a_plan_that_ends_while_the_team_moves_is_balanced_with_ca
     pulls = dynamics.wrench_matrix(its.platform[0], its.carriers[0]) @ its.tensions[..., None]
     missing = dynamics.required_wrench(*its.platform) - pulls[..., 0]
     assert np.abs(missing[:, :3]).max() < 0.005 * robot.weight
+
+
+@pytest.mark.parametrize(
+    ("robot", "height", "radius", "rate", "task"),
+    [
+        (load("multi-quadrotor-3"), 0.0, 0.6, 1.6, {"base": {"kind": "free", "ends": "periodic"}}),
+        (load("ipanema-2"), 2.0, 0.8, 0.8, {}),  # which rests only in some places
+    ],
+)
+def test_a_stop_near_the_end_of_a_periodic_plan_is_on_its_next_period(robot, height, radius, rate, task):
+    """As on the samples of two periods, one after the other, where it begins far from the end."""
+    circle = {"kind": "circle", "centre": [0, 0, height], "radius": radius, "rate": rate}
+    if not task:
+        weak = tuple(cable.model_copy(update={"t_max": 53.5}) for cable in robot.cables)
+        robot = robot.model_copy(update={"cables": weak})
+    found = plan(robot, {"path": circle} | task)
+    assert found.feasible
+    one, begins = found.trajectory, found.duration - 0.05
+    later = one.isel(time=slice(1, None)).assign_coords(time=one.time[1:] + found.duration)
+    twice = xr.concat([one, later], "time", data_vars="minimal")
+    twice.attrs = one.attrs
+    its, other = stop(one, begins), stop(twice, begins)
+    assert its.feasible
+    assert its.ends > found.duration + 0.1
+    assert its.duration == pytest.approx(other.duration, abs=1e-9)
+    for here, there in zip((*its.platform, *its.carriers), (*other.platform, *other.carriers), strict=True):
+        np.testing.assert_allclose(here, there, atol=1e-6)
+    np.testing.assert_allclose(its.tensions, other.tensions, rtol=1e-5, atol=1e-5)
+
+
+def test_a_platform_that_turns_in_each_period_goes_on_turning():
+    def at(times):
+        pose = np.zeros((len(times), 6))
+        pose[:, 0], pose[:, 5] = np.sin(2 * times), 2 * times
+        rates, bends = np.zeros_like(pose), np.zeros_like(pose)
+        rates[:, 0], rates[:, 5], bends[:, 0] = 2 * np.cos(2 * times), 2, -4 * np.sin(2 * times)
+        return (pose, rates, bends), tuple(part[:, None] for part in (pose, rates, bends))
+
+    def once(times):
+        assert times.max() < np.pi + 1e-9
+        return at(times)
+
+    times = np.linspace(0.0, 20.0, 333)
+    for found, true in zip(continued(Trajectory(np.pi, once), together=False).at(times), at(times), strict=True):
+        np.testing.assert_allclose(found, true, atol=1e-9)
 
 
 @pytest.mark.parametrize("share", [0.4, 0.6, 0.75])
