@@ -23,7 +23,8 @@ with the bandwidths k of the loops around them, of position and of deviations fr
 position need h > 2 k without any delay. How far apart steps are is known only later: h is then lowered (control/
 slow_loops.py) so that lag, delay and steps keep the first bound together. Drives whose
 commands lead by a known lag have all of this lag while the commands are at their limits, where a loop with h lag > 2
-oscillates for good. So with all of the lag the bound is 1 in place of 0.5, unless h would be below 15 rad/s.
+oscillates for good. So with all of the lag the bound is 1 in place of 0.5, unless h would be below 15 rad/s (18 rad/s
+with a delay that is told).
 """
 
 from collections.abc import Mapping
@@ -56,7 +57,9 @@ READINGS = 1e3  # [1/s], without a rate
 GRAVITY, TINY = 9.81, 1e-12  # [m/s^2]; what divides
 ATTITUDE = 40.0  # [rad/s]
 USUALLY, AT_LIMITS = 0.5, 1.0  # bounds of h times lateness; where commands at their limits cannot lead
-SLOWEST = 15.0  # [rad/s], of attitude loops: teams were lost below
+SLOWEST, WRONG = 15.0, 18.0  # [rad/s], of attitude loops: teams were lost below; where delays are told, wrong by 30 %
+SEPARATE = 2.0  # attitude over observers of teams, at least; with 0.9 and late states, teams were handed over
+FREE = 1.5  # times the period of sensors: predictions omit that cables of fixed length tighten
 PLACE, CASCADE = 5.0, 6.0  # bandwidth of position [rad/s]; attitude over it and over that of deviations, at least
 
 
@@ -123,7 +126,10 @@ def bandwidths_for(
         )
     by_noise = errors.permit_noise(usual.bandwidth, usual.observer, errors.calm)
     part = min(part, usual.most, max(min(by_noise, errors.permit_leaning(usual.bandwidth)), LEAST))
-    given = np.full(6, part * usual.bandwidth) if w is None else w, part * usual.observer if K is None else K
+    most = part * usual.observer
+    if K is None and h is None and robot.fixed_lengths is not None:
+        most = min(most, _attitude_for(robot, errors, rotor_lag, None) / SEPARATE)
+    given = np.full(6, part * usual.bandwidth) if w is None else w, most if K is None else K
     part, reason = errors.permit(float(given[0].max()), given[1])
     if LOST * part < 1.0:
         raise InputError(
@@ -147,10 +153,11 @@ def _attitude_for(robot: Robot, errors: "_Errors | None", lag: float, given: flo
             f"attitude must be at most {1 / UNSTABLE / weight:.3g} rad/s if carriers turn {quantity(late, 's')} late, "
             f"got {given:g} rad/s"
         )
-    most = min(ATTITUDE, USUALLY / weight, max(AT_LIMITS / (lag / 2 + by_sensors), SLOWEST))
-    if given is None and most < SLOWEST:
+    slowest = WRONG if delay else SLOWEST
+    most = min(ATTITUDE, USUALLY / weight, max(AT_LIMITS / (lag / 2 + by_sensors), slowest))
+    if given is None and most < slowest:
         raise InputError(
-            f"sensors must permit attitude loops of {SLOWEST:g} rad/s, got carriers that turn {quantity(late, 's')} "
+            f"sensors must permit attitude loops of {slowest:g} rad/s, got carriers that turn {quantity(late, 's')} "
             f"late, which permits {most:.2g} rad/s"
         )
     return given or most
@@ -232,16 +239,20 @@ def _errors_of(noise: Noise, robot: Robot) -> _Errors:
     step, size = 1.0 / (noise.rate or READINGS), np.array([1.0, robot.length])
     age, position = age_of(noise), noise.of_pose
     predicted = (1 - MISTOLD) * noise.delay if age <= OLDEST else 0.0
-    late = 0.0 if noise.stamped else age - predicted
+    held, holds = step if noise.rate else 0.0, not is_underactuated(robot)
+    if holds and robot.fixed_lengths is not None:
+        late = noise.delay - predicted + FREE * held
+    else:
+        late = 0.0 if noise.stamped else age - predicted
     velocity = np.array([noise.velocity, noise.attitude_rate])
     if noise.differenced:
         late, velocity = late + step / 2, np.hypot(velocity, np.sqrt(2) * position / step)
     late += WINCHES_KEEP if robot.fixed_lengths is None else 0.0
-    strict = robot.fixed_lengths is None and not is_underactuated(robot)
+    strict = robot.fixed_lengths is None and holds
     of_tensions = ripple(robot, limits_of(robot, None), np.repeat(velocity, 3)) if strict and velocity.any() else None
     most = 0.0 if of_tensions is None else OFTEN * float(np.linalg.norm(of_tensions, axis=1).max())
     limit = CALM if strict else NOISE
     turned = 0.0 if noise.stamped else TURNED * noise.delay if age <= OLDEST else noise.delay
-    far, held = float((size * position).max()), step if noise.rate else 0.0
+    far = float((size * position).max())
     lean = 0.0 if robot.fixed_lengths is None else float(robot.fixed_lengths.mean()) / GRAVITY
     return _Errors(turned, held, late, far, size * velocity, limit, lean, most)

@@ -187,10 +187,34 @@ def test_attitude_loops_are_as_fast_as_rotors_and_sensors_permit():
 
 
 @pytest.mark.parametrize("make", [ComputedTorque, Predictive])
-@pytest.mark.parametrize("late", [{"delay": 0.06}, {"rate": 15}, {"rate": 15, "delay": 0.03, "stamped": True}])
-def test_a_team_is_not_started_with_sensors_that_leave_its_attitude_loops_too_slow(make, late):
-    with pytest.raises(InputError, match=r"sensors must permit attitude loops of 15 rad/s, got carriers"):
+@pytest.mark.parametrize(
+    ("late", "least"), [({"delay": 0.046}, 18), ({"rate": 15}, 15), ({"rate": 15, "delay": 0.03, "stamped": True}, 15)]
+)
+def test_a_team_is_not_started_with_sensors_that_leave_its_attitude_loops_too_slow(make, late, least):
+    with pytest.raises(InputError, match=rf"sensors must permit attitude loops of {least} rad/s, got carriers"):
         make("multi-quadrotor-4", sensors=late)
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "told", "factor"),
+    [
+        (Predictive, "multi-quadrotor-4", {"delay": 0.0449}, 1.3),
+        (ComputedTorque, "multi-quadrotor-4", {"delay": 0.0449}, 1.3),
+        (Predictive, "multi-quadrotor-3", {"rate": 25, "delay": 0.03, "stamped": True}, 1.0),
+        (ComputedTorque, "multi-quadrotor-6", {"rate": 25, "delay": 0.03, "stamped": True}, 1.0),
+        (ComputedTorque, "multi-quadrotor-6", {"rate": 50, "delay": 0.03, "stamped": True}, 1.0),
+    ],
+)
+def test_a_team_with_the_latest_sensors_that_are_permitted_corrects_a_push(make, name, told, factor):
+    """Even if the true delay is `factor` times as long. With longer delays it is refused, by the test above."""
+    robot, noise = load(name), told | {"delay": factor * told["delay"]}
+    force = 0.02 * robot.weight * np.array([0.6, 0.8, 0.0])
+    push = [{"kind": "push", "at": 0.2, "duration": 0.3, "force": force.tolist()}]
+    team = simulate(robot, robot.home, make(robot, sensors=told), duration=4.0, period=5e-3, noise=noise, events=push)
+    assert team.handed_over is None
+    assert team.answered["as planned"] == len(team.error)
+    assert 1e-4 < team.error.max() < 0.03
+    assert team.error[-20:].max() < 0.5 * team.error.max()
 
 
 @pytest.mark.parametrize("make", [ComputedTorque, Predictive, FaultTolerant])
