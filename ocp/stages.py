@@ -137,8 +137,9 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
     left, slowest = _durations(search), scenario.lasting(span.max)
     own = left is None or left.leave(span.min, span.max)
     given = scenario.task.objective.time is None or has_own_law(scenario)
+    power = too_little_power(slowest, span.max / span.min) if own and given and left is not None else []
     if own and given:
-        proven = scenario.stretches and exceeds(slowest, np.linspace(0.0, span.max, PLACES)).any()
+        proven = power or (scenario.stretches and exceeds(slowest, np.linspace(0.0, span.max, PLACES)).any())
     else:
         with search.stage("timing") as stage:
             fast, stage.message = search.timing.fastest
@@ -155,7 +156,8 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
     # The slowest motion is the closest one if no law is fast enough, none passes some place, or the own is too fast.
     audit = search.audit_motion(slowest, None, f"audit, duration {quantity(span.max, 's')}")
     if own:
-        audit = replace(audit, excess=[each for each in audit.excess if each.limit in FALLING], certificate=None)
+        excess = power or [each for each in audit.excess if each.limit in FALLING]
+        audit = replace(audit, excess=excess, certificate=None)
     if audit.passed or (own and not audit.excess):
         return None, True
     offers = partial(feasible_changes, search, slowest, None, audit)

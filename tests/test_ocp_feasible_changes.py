@@ -576,8 +576,9 @@ def test_the_share_of_t_min_at_which_a_team_rests_is_that_of_its_only_tensions()
         cable["t_min"] = 20.0
     robot = Robot.model_validate(data)
     task = {"path": {"kind": "line", "start": [0, 0, 0], "end": [0.1, 0, 0]}, "duration": 3}
-    change = smaller_t_min(lay_out(robot, read_task(task | {"base": {"kind": "free", "ends": "rest"}})))
-    share = _largest(lambda share: change.at(share)[0])
+    scenario = lay_out(robot, read_task(task | {"base": {"kind": "free", "ends": "rest"}}))
+    change = smaller_t_min(scenario)
+    share = _largest(Search(scenario, {}, None), lambda share: change.at(share)[0])
     own = tensions(load("multi-quadrotor-3"), robot.home).tensions.min()
     missed = 0.1 * robot.weight  # is what rest may miss of the force of few cables, which a program finds
     assert 20 * share == pytest.approx(own, abs=missed / 3 + 20 / 50)

@@ -9,9 +9,11 @@ import pytest
 from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, plan
 from towline.ocp.limits import Limit
+from towline.ocp.nlp.rows import Mesh
 from towline.ocp.proofs.durations import durations
 from towline.ocp.search import feasible_changes, refinement, slower
 from towline.ocp.search.feasible_changes import looser_limits
+from towline.ocp.search.largest_share import _may_be_feasible as may_be_feasible
 from towline.ocp.search.search import Search
 from towline.ocp.tasks import scenario, task_checks
 from towline.ocp.tasks.ends import between_fixed_values
@@ -270,6 +272,35 @@ def test_the_jerk_of_cables_is_kept_by_a_longer_duration():
     assert given_again(longer).feasible
 
 
+def test_a_smaller_change_keeps_tensions_also_where_an_audit_missed_them():
+    """A jerk of 0.4 s in 200 s of rest is between the instants at which tensions are sought before an audit."""
+    robot = load("ipanema-1")
+    start, end = np.array(robot.home[:3]), np.add(robot.home[:3], [0.5, 0.0, 0.2])
+    line = {"kind": "line", "start": start.tolist(), "end": end.tolist()}
+    rests = [{"path": {"kind": "rest", "pose": place.tolist()}, "duration": 100} for place in (start, end)]
+    parts = [rests[0], {"path": line, "duration": 0.3}, rests[1]]
+    scenario = lay_out(robot, read_task({"path": {"kind": "sequence", "parts": parts}}))
+    search = Search(scenario, {}, None)
+    assert may_be_feasible(search, scenario)
+    audit = search.audit_motion(scenario, None)
+    assert abs(audit.times[audit.worst] - 100.15) < 0.15
+    assert not may_be_feasible(search, scenario)
+    found = feasible_changes.feasible_changes(search, scenario, None, audit)
+    assert found.found
+    assert all(plan(each.plan.scenario.robot, each.plan.scenario.task).feasible for each in found.found)
+
+
+def test_a_program_without_a_solution_ends_with_the_effort_that_it_may_take():
+    """The platform is too fast for its limit, which the program does not see at once."""
+    line = {"kind": "line", "start": [0, 0, 1], "end": [0.6, 0.4, 1.6]}
+    task = {"path": line, "duration": 1.0, "tube": {"position": 0.05}, "limits": {"platform_speed": 0.1}}
+    whole, cut = (Search(lay_out(load("ipanema-1"), read_task(task)), {}, None) for _ in range(2))
+    assert not whole.solve("program", Mesh(20), None).success
+    cut.most_effort = 0.8 * whole.effort
+    assert not cut.solve("program", Mesh(20), None).success
+    assert cut.effort <= 1.1 * cut.most_effort  # restoration takes some iterations more
+
+
 def test_an_enclosed_end_has_a_way_without_the_wall_that_closes_it(monkeypatch):
     """Six walls enclose the end: those that the closest motion passes through go, and planning finds the way."""
     robot, end, h = load("point-mass-3"), np.array([0.4, 0.2, 1.0]), 0.2
@@ -292,7 +323,7 @@ def test_an_enclosed_end_has_a_way_without_the_wall_that_closes_it(monkeypatch):
     kept = [wall for wall in walls if repr(wall["name"]) not in offer.detail]
     assert offer.possible == len(kept) < len(walls)
     assert plan(robot, task | {"limits": {"keep_out": kept}}).feasible
-    monkeypatch.setattr(refinement, "MOST_EFFORT", 0.0)
+    monkeypatch.setattr(refinement, "LEAST_EFFORT", np.inf)
     none = feasible_changes.feasible_changes(search, laid_out, through, search.audit_motion(laid_out, through))
     assert not none.found
     assert none.cut_short

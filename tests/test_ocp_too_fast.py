@@ -211,6 +211,11 @@ def test_a_power_that_no_tensions_need_is_the_least_that_is_feasible(name):
     assert planned(0.99 * least).status is MotionStatus.INFEASIBLE
     both = {"winch_power": 0.99 * least, "own": (WinchPower(robot, 2 * least),)}
     assert plan(robot, task | {"limits": both}).audit.excess[0].value == pytest.approx(least)
+    faster = {"duration": {"min": 0.4, "max": 1.0}}  # motions need more power still
+    in_range = plan(robot, task | faster | {"limits": {"winch_power": 0.99 * least}})
+    assert in_range.status is MotionStatus.INFEASIBLE
+    assert [each.value for each in in_range.audit.excess] == pytest.approx([least])
+    assert plan(robot, task | faster | {"limits": {"winch_power": 1.003 * least}}).feasible
     enough = planned(1.003 * least)
     assert enough.feasible
     assert enough.deviation is None

@@ -49,9 +49,11 @@ from .other_paths import (
 )
 from .past_regions import IN_THE_WAY, fewer_regions, past_regions
 from .refinement import rounded, solved
-from .search import Search
+from .search import OF_AUDIT, Search
 from .slower import LONGER, longer, longer_duration, longer_phases, other_duration, slower, slower_rate, slower_states
 
+# Of all offers [us]: a second, or half of what the plan took if that is longer, or a few audits as long as its own.
+EFFORT, OF_PLAN, AUDITS = 1e6, 0.5, 3.0
 TRIES = 3  # with other limits, the motion may exceed others
 HALVINGS = 12  # of a margin
 PREFERRED = 1e-3  # of a limit's scale: an excess that costs one, so that other costs hardly matter
@@ -220,6 +222,8 @@ OTHERS = lighter_load, less_wind, nearer_end, less_margin, slower_rate, longer
 
 def feasible_changes(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> Offers:
     """Return changes that make a scenario feasible; `audit` is its closest motion's, with a `deviation`."""
+    few_audits = AUDITS * OF_AUDIT * audit.tensions.size
+    search.most_effort = search.effort + max(EFFORT, OF_PLAN * search.effort, few_audits)
     return Offers(_changes(search, scenario, deviation, audit), search.cut_short)
 
 

@@ -1,6 +1,7 @@
 """Find the largest variation of a task that is feasible: `largest_share` of one change, `together` of several."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import product
 from typing import Any, NamedTuple, TypeAlias
 
@@ -21,11 +22,11 @@ from ..tasks.wind_set import possible_winds_at
 from .refinement import planned, rounded
 from .search import Search
 
-INSTANTS = 120  # at which tensions must exist before a motion is audited
+INSTANTS = 120  # at which tensions must exist before a motion is audited, besides those at which audits failed
 HALVINGS, OF_PROOFS = 10, 6  # the latter where a program decides what is offered
 # Halvings without a feasible scenario, until the least share decides: with that, a platform may be too light for t_min.
 HOPELESS = 3
-RESERVES = 1.0, 0.98, 0.9  # of the largest share with tensions at these instants, tried in order until an audit passes
+RESERVES = 1.0, 0.98, 0.9  # of the largest share with tensions at these instants, until an audit passes
 OF_PROGRAMS = 0.5, 0.9  # of it, if programs decide: in order until one has no solution
 LEAST = 0.1  # of it, if the first one has none
 ORDERS = {"/s": 1, "W": 1, "/s^2": 2, "/s^3": 3}  # of the rates with such units, which fall with 1/T to that power
@@ -63,9 +64,9 @@ Maker: TypeAlias = Callable[[Scenario], Change | None]
 
 def largest_share(search: Search, change: Change | None) -> list[Relaxed]:
     """Return the variation with the largest share that passes its audit; [] if none is found."""
-    if change is None:
+    if change is None or search.cut_short:
         return []
-    largest = _largest(lambda share: change.at(share)[0], least=change.least)
+    largest = _largest(search, lambda share: change.at(share)[0], least=change.least)
     name = f"audit, other {change.name}"
     found = _planned(search, lambda part: change.at(part * largest)[0], name) if largest else None
     return [] if found is None else [change.offer(found[0] * largest, found[1])]
@@ -81,10 +82,10 @@ def together(search: Search, scenario: Scenario, makers: Sequence[Maker]) -> lis
 
     def easy(makers: Sequence[Maker]) -> bool:
         easiest = _legal(lambda share: _changed(scenario, makers, np.full(len(makers), share))[1], EASIEST)
-        return easiest is not None and _may_be_feasible(easiest)
+        return easiest is not None and _may_be_feasible(search, easiest)
 
     kept = every = [make for make in makers if make(scenario) is not None]
-    if not easy(every):
+    if search.cut_short or not easy(every):
         return []
     for make in tuple(every):
         others = [each for each in kept if each is not make]
@@ -107,11 +108,10 @@ def _with_shares(search: Search, scenario: Scenario, makers: Sequence[Maker]) ->
         return _changed(scenario, makers, shares)[1]
 
     every = np.ones(len(makers))
-    shares = every * _largest(lambda share: at(share * every), EASIEST)  # the same for all
+    shares = every * _largest(search, lambda share: at(share * every), EASIEST)  # the same for all
     for row in np.eye(len(makers), dtype=bool):
-        shares = np.where(
-            row, _largest(lambda share, row=row, others=shares: at(np.where(row, share, others)), shares.min()), shares
-        )
+        one = partial(lambda row, others, share: at(np.where(row, share, others)), row, shares)
+        shares = np.where(row, _largest(search, one, shares.min()), shares)
     found = _planned(search, lambda part: at(part * shares), "audit, changes together")
     return found and (found[0] * shares, found[1])
 
@@ -129,7 +129,7 @@ def _changed(scenario: Scenario, makers: Sequence[Maker], shares: np.ndarray) ->
     return changes, scenario
 
 
-def _largest(at: Callable[[float], Scenario], low: float = 0.0, least: float = EASIEST) -> float:
+def _largest(search: Search, at: Callable[[float], Scenario], low: float = 0.0, least: float = EASIEST) -> float:
     """Return the largest share from a low one on whose scenario may be feasible; the low one if none is known.
 
     If the first halvings find none, the search goes on only if the scenario of the `least` share may be feasible.
@@ -137,7 +137,7 @@ def _largest(at: Callable[[float], Scenario], low: float = 0.0, least: float = E
 
     def possible(share: float) -> bool:
         varied = _legal(at, share)
-        return varied is not None and _may_be_feasible(varied)
+        return varied is not None and _may_be_feasible(search, varied)
 
     high = 1.0
     for halving in range(OF_PROOFS if (most := _legal(at, 1.0)) and by_programs(most) else HALVINGS):
@@ -158,7 +158,12 @@ def _planned(search: Search, at: Callable[[float], Scenario], name: str) -> tupl
         return None if plan is None else (part, plan)
 
     if not ((most := _legal(at, 1.0)) and by_programs(most)):
-        return next(filter(None, map(tried, RESERVES)), None)
+        part = 1.0
+        for reserve in RESERVES:
+            if part and (found := tried(reserve * part)):
+                return found
+            part = _largest(search, at)
+        return None
     best: tuple[float, Plan] | None = None
     for part in OF_PROGRAMS:
         if not (larger := tried(part, best and best[1])):
@@ -185,7 +190,7 @@ def _legal(at: Callable[[float], Scenario], share: float) -> Scenario | None:
         return None
 
 
-def _may_be_feasible(scenario: Scenario) -> bool:
+def _may_be_feasible(search: Search, scenario: Scenario) -> bool:
     """Return whether limits and tensions permit some instants of a fixed motion, tensions only off the ground.
 
     If only a program shows whether there is a motion, return whether nothing proves that there is none.
@@ -193,7 +198,8 @@ def _may_be_feasible(scenario: Scenario) -> bool:
     if by_programs(scenario):
         hurried = bool(scenario.carrier_free) and at_ease(scenario) > HURRIED * scenario.duration
         return not hurried and rests(scenario) and infeasible_ends(scenario) is None
-    times = np.linspace(0.0, scenario.duration, INSTANTS)
+    shares = np.append(np.linspace(0.0, 1.0, INSTANTS), [*search.failed])
+    times = scenario.duration * np.unique(shares)
     if exceeds(scenario, times).any():
         return False
     times = times[~scenario.phases.resting(times)]

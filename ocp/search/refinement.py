@@ -12,7 +12,7 @@ from ..audits.audit import Audit
 from ..audits.excess import TENSIONS
 from ..limits.platform import PlatformSpeed
 from ..nlp.rows import Mesh
-from ..nlp.solver import MOST_ITERATIONS, Outcome
+from ..nlp.solver import Outcome
 from ..plan import Plan
 from ..proofs.infeasible_ends import infeasible_ends
 from ..tasks.scenario import Scenario
@@ -30,15 +30,12 @@ TIGHTENINGS = 3  # on the same mesh
 LITTLE = 0.05  # of a limit: what a motion exceeds between nodes where the same mesh does
 TIGHTENED = 1.1  # times what the audit reports, on the same mesh
 LARGEST_SHARE = 0.2  # of a limit, for what one audit reports
+DIGITS = 4  # of what is offered: reports print no more
+PART = 0.6  # of the remaining effort, for one program
+LEAST_EFFORT = 1e5  # [us]: less finds nothing
+LARGE, FEWEST = 600, 20  # free coordinates at all nodes of a mesh, and its steps
 
 Shares: TypeAlias = tuple[tuple[str, str, float], ...]
-DIGITS = 4  # of what is offered: reports print no more
-# Effort of all programs of offers, as iterations times free coordinates at their nodes: what the plan took, within
-# these bounds, of a few seconds.
-LEAST_EFFORT, MOST_EFFORT = 8e4, 1.2e5
-PART = 0.6  # of the remaining effort, for one program
-LEAST_ITERATIONS = 15  # fewer find nothing
-LARGE, FEWEST = 600, 20  # free coordinates at all nodes of a mesh, and its steps
 """Name of a limit, what it is about, and the share by which it is reduced (`Mesh.further`)."""
 
 
@@ -166,10 +163,10 @@ def planned(search: Search, scenario: Scenario, name: str, guess: Deviation | No
     Without free coordinates it is the motion itself, else the solution of the program, refined as for any task,
     unless the scenario is proven infeasible.
     """
-    if not scenario.count:
+    if not scenario.count and not _cut_short(search):
         audit = search.audit_motion(scenario, None, name)
         return Plan(scenario, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0) if audit.passed else None
-    if infeasible_ends(scenario) is not None:
+    if not scenario.count or infeasible_ends(scenario) is not None:
         return None
     with _solved_beside(search, scenario, guess) as found:
         if found is None:
@@ -191,23 +188,25 @@ def _solved_beside(
 ) -> Iterator[tuple[Search, Outcome] | None]:
     """Yield the search for a motion of another scenario, in the time that the task's limit left, and its solution.
 
-    Its programs may take a part of the iterations that are left for offers: with a limit in seconds, a busy machine
-    would find other results. None if too few are left, so that the search for offers is cut short, or if there is no
-    solution. The mesh has fewer steps than a large task, since the refinement adds some.
+    Its programs and audits may take a part of the effort that is left for offers. None if too little is left, or if
+    there is no solution. The mesh has fewer steps than a large task, since the refinement adds some.
     """
-    left = min(max(search.effort, LEAST_EFFORT), MOST_EFFORT) - search.offers_effort
-    count, steps = max(scenario.count, 1), scenario.task.steps
-    most = int(PART * left / (count * steps))
-    if most < LEAST_ITERATIONS:
-        search.cut_short = True
+    if _cut_short(search):
         yield None
         return
-    left_s = scenario.task.time_limit - search.solve_s
-    beside = Search(scenario, {}, search.progress, left_s, min(most, MOST_ITERATIONS))
+    count, steps = max(scenario.count, 1), scenario.task.steps
+    beside = Search(scenario, {}, search.progress, scenario.task.time_limit - search.solve_s)
+    beside.most_effort = PART * (search.most_effort - search.effort)
     mesh = Mesh(steps if scenario.phases.all else min(steps, max(LARGE // count, FEWEST)))
     outcome = beside.solve("program of a relaxation", mesh, guess)
     yield (beside, outcome) if outcome.success else None
-    search.offers_effort += beside.effort
+    search.effort += beside.effort
+
+
+def _cut_short(search: Search) -> bool:
+    """Return whether too little effort is left for offers, which the search notes."""
+    search.cut_short |= search.most_effort - search.effort < LEAST_EFFORT
+    return search.cut_short
 
 
 def rounded(value: float, up: bool) -> float:

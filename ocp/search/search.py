@@ -33,6 +33,12 @@ FEW = 8  # regions
 ROUNDS = 4  # of rows that are added where a solution exceeds what the program leaves out; then it has all
 PASSES = 3  # with linear distances; more, at most as many as `ROUNDS`, where true distances are still missed
 MOST_COARSE = 150  # iterations of a program that only leads to another: those that end well take 20 to 90
+# Effort of an iteration for each unknown and row, times the root of how many there are at a node, and of an audit for
+# each of its tensions [us], on a usual processor. Measured times would make offers depend on how busy the machine is.
+OF_PROGRAM, OF_AUDIT = 0.4, 0.9
+PEAKS = 50  # of missing wrenches, that are known of an audit
+TO_BUILD = 20  # iterations take as long as building their program
+LEAST_ITERATIONS = 15  # fewer find nothing
 MOST_AGAIN = 60  # iterations from a solution that is near: more do not lead to one
 APPROACHED = 1e-3  # of a distance's scale: what true distances may miss at the end
 USABLE = 1e-2  # of it: what the true program makes up for
@@ -54,8 +60,7 @@ class Search:
 
     New `solvers` are added to those that exist already, by mesh. `progress` is called with (iteration, objective,
     infeasibility). All that the search does takes `seconds`, from now on; default: the task's time limit, less what the
-    last audit takes. Each run of a solver takes at most `most_iterations`. `timing` is what is known of the scenario's
-    path.
+    last audit takes. `timing` is what is known of the scenario's path.
     """
 
     def __init__(
@@ -64,12 +69,10 @@ class Search:
         solvers: dict[Mesh, Solver],
         progress: Progress | None,
         seconds: float | None = None,
-        most_iterations: int = MOST_ITERATIONS,
         timing: PathTiming | None = None,
     ):
         self.scenario, self.progress, self._solvers = scenario, progress, solvers
         self.timing = timing or PathTiming(scenario)
-        self._most_iterations = most_iterations
         limit = scenario.task.time_limit
         own = limit - min(FOR_AUDIT * limit, MOST_FOR_AUDIT)
         self._deadline = time.perf_counter() + (own if seconds is None else seconds)
@@ -82,8 +85,9 @@ class Search:
         self._audited: list[tuple[float, Outcome, Audit]] = []
         self._interrupted: Outcome | None = None
         self._circled = 0  # steps of the program that went in a circle last
-        self.effort = 0.0  # of all runs of solvers: iterations times free coordinates at all nodes
-        self.offers_effort, self.cut_short = 0.0, False  # of the search for offers, and whether it had to stop
+        self.effort, self.most_effort = 0.0, np.inf  # of programs and audits, in microseconds of a usual processor
+        self.cut_short = False  # whether the search for offers had to stop
+        self.failed = set[float]()  # shares of the duration at which audits of fixed motions found missing wrenches
 
     def take(self, scenario: Scenario) -> None:
         """Go on with another scenario, without what is known of the one before."""
@@ -119,8 +123,8 @@ class Search:
 
     @property
     def seconds_left(self) -> float:
-        """Return how much is left of the time for the search [s]."""
-        return max(self._deadline - time.perf_counter(), 0.0)
+        """Return how much is left of the time for the search [s]: nothing after its largest effort."""
+        return max(self._deadline - time.perf_counter(), 0.0) if self.effort < self.most_effort else 0.0
 
     def knows(self, mesh: Mesh) -> bool:
         """Return whether the program of `mesh` exists: it may have a solution to start from."""
@@ -260,14 +264,12 @@ class Search:
         With `near` it is made again, with those rows.
         """
         start, self.mesh = time.perf_counter(), mesh
-        coarse = mesh.steps < self.scenario.task.steps
-        most = min(self._most_iterations, MOST_COARSE if coarse else MOST_ITERATIONS)
         known = self._solvers.get(mesh)
         again = known is not None and guess is None and known.has_solution  # continues from there, with its own rows
         if near is not None:
-            self._solvers[mesh] = wait_for(lambda: Solver(self._build(self.scenario, mesh, near), most))
+            self._solvers[mesh] = wait_for(lambda: self._solver(self._build(self.scenario, mesh, near)))
         elif known is None or not (again or np.isfinite(reach) or known.program.near.is_everywhere):
-            self._solvers[mesh] = wait_for(lambda: Solver(self._built(mesh, guess, reach), most))
+            self._solvers[mesh] = wait_for(lambda: self._solver(self._built(mesh, guess, reach)))
         solver = self._solvers[mesh]
         solver.prepare(guess, coarser)
         built = time.perf_counter()
@@ -279,8 +281,14 @@ class Search:
             raise
         self.build_s += built - start
         self.solve_s += time.perf_counter() - built
-        self.effort += outcome.iterations * mesh.steps * max(self.scenario.count, 1)
+        self.effort += (outcome.iterations + (solver is not known) * TO_BUILD) * effort_of(solver.program)
         return outcome
+
+    def _solver(self, program: Program) -> Solver:
+        """Return the solver of a new program, with as many iterations as the remaining effort permits."""
+        most = MOST_COARSE if program.mesh.steps < self.scenario.task.steps else MOST_ITERATIONS
+        left = (self.most_effort - self.effort) / effort_of(program) - TO_BUILD
+        return Solver(program, int(max(min(most, left), LEAST_ITERATIONS)))
 
     def _built(self, mesh: Mesh, guess: Deviation | None, reach: float) -> Program:
         """Return the program of `mesh`, without the rows of regions that are farther than `reach` from the guess."""
@@ -352,8 +360,20 @@ class Search:
         """Audit any motion whose audit is not `known`."""
         with self.stage(name) as stage:
             audited = known or audit(scenario, deviation)
+            self.effort += OF_AUDIT * audited.tensions.size
+            if not scenario.count:
+                missed = np.where(audited.violation > audited.tolerance, audited.violation, 0.0)
+                peaks = 1 + np.flatnonzero((missed[1:-1] > missed[:-2]) & (missed[1:-1] >= missed[2:]))
+                about = (peaks[np.argsort(-missed[peaks])[:PEAKS]] + np.array([[-1], [0], [1]])).ravel()
+                self.failed |= {*(audited.times[about] / audited.times[-1]).tolist()}  # on both sides of a jump
             stage.message = "passed" if audited.passed else describe(audited)
         return audited
+
+
+def effort_of(program: Program) -> float:
+    """Return the effort of an iteration, from unknowns and rows: near regions have some at each node, teams many."""
+    size = program.lower.size + program.lower_g.size
+    return float(OF_PROGRAM * size * np.sqrt(size / program.mesh.steps))
 
 
 def ended(message: str) -> str:
