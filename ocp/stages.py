@@ -128,30 +128,31 @@ def _blocked(search: Search) -> Plan | None:
 def _time_law(search: Search) -> tuple[Plan | None, bool]:
     """Plan a motion with only the time law free; return also whether the path's own time law may be feasible.
 
-    The plan is feasible, or proves that no time law is: of all, or of those that the planner may choose, which is the
-    path's own unless the objective has the time. Otherwise it is None.
+    The plan is feasible, or proves that no time law is; otherwise it is None. Without `time` in the objective the
+    fastest law is computed only if the path's own one is too fast or has no tensions in all durations; none is chosen
+    for less power of the winches.
     """
     scenario, span = search.scenario, search.scenario.duration_range
     if span is None:
         return None, True
     left, slowest = _durations(search), scenario.lasting(span.max)
-    own = left is None or left.leave(span.min, span.max)
-    given = scenario.task.objective.time is None or has_own_law(scenario)
-    power = too_little_power(slowest, span.max / span.min) if own and given and left is not None else []
-    if own and given:
-        proven = power or (scenario.stretches and exceeds(slowest, np.linspace(0.0, span.max, PLACES)).any())
-    else:
+    own, alone = left is None or left.leave(span.min, span.max), has_own_law(scenario)
+    chosen_by_time = scenario.task.objective.time is not None and not alone
+    power = too_little_power(slowest, span.max / span.min) if own and left is not None and not chosen_by_time else []
+    too_fast = own and scenario.stretches and exceeds(slowest, np.linspace(0.0, span.max, PLACES)).any()
+    law, too_slow = None, False
+    if chosen_by_time or not (alone or power or (own and not too_fast)):
         with search.stage("timing") as stage:
             fast, stage.message = search.timing.fastest
-        law, least = None if fast is None else fast.law, span.min if own else 0.0
+        law, least = None if fast is None else fast.law, span.min if own and not too_fast else 0.0
         if fast is not None and law is not None and fast.feasible and least <= fast.duration <= span.max:
             chosen = scenario.along(law.path.resting_until(span.min), max(fast.duration, span.min))
             known = audit_of_law(fast, chosen) if chosen.path is law.path else None
             audit = search.audit_motion(chosen, None, "audit with the fastest time law", known)
             return (Plan(chosen, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0) if audit.passed else None), own
         too_slow = fast is not None and fast.feasible and BOUND * fast.duration > span.max
-        proven = not own and (given or too_slow or (law is not None and law.certificate is not None))
-    if not proven:
+    none_other = alone or power or too_slow or (law is not None and law.certificate is not None)
+    if not none_other or (own and not (power or too_fast)):
         return None, own
     # The slowest motion is the closest one if no law is fast enough, none passes some place, or the own is too fast.
     audit = search.audit_motion(slowest, None, f"audit, duration {quantity(span.max, 's')}")

@@ -116,17 +116,26 @@ def test_a_motion_that_is_too_fast_tells_a_duration_that_would_do():
 
 @pytest.mark.parametrize(("name", "peak"), [("platform_speed", 35 / 16), ("platform_acceleration", None)])
 @pytest.mark.parametrize("share", [0.99, 1.01])
-def test_a_time_law_that_is_too_fast_in_the_longest_duration_is_proven_infeasible(name, peak, share):
-    """A lift of 1 m by the smooth line's own time law, of closed form, in at most 2 s: no objective chooses another."""
+def test_where_the_own_time_law_is_too_fast_in_the_longest_duration_the_fastest_is_the_plan(name, peak, share):
+    """A lift of 1 m by the smooth line's own time law, of closed form, in at most 2 s."""
     most = peak / 2 if peak else largest_acceleration(np.linspace(0, 1, 100_001)).max() / 4
     task = {"path": LIFT, "duration": {"min": 0.5, "max": 2}, "limits": {name: share * most}}
     found = plan(hoist(4.0), task)
-    assert found.status is (MotionStatus.FEASIBLE if share > 1 else MotionStatus.INFEASIBLE)
-    if share < 1:
-        (excess,) = found.audit.excess
-        assert excess.limit == name
-        assert excess.value == pytest.approx(most, rel=1e-5)
-        assert plan(hoist(4.0), task | {"objective": {"time": 1}}).feasible  # another law is not as fast
+    assert found.feasible
+    assert ("timing" in [stage.name for stage in found.stages]) == (share < 1)
+    uniform = plan(hoist(4.0), task | {"path": {**LIFT, "timing": "uniform"}, "limits": {"platform_speed": 0.49}})
+    assert uniform.status is MotionStatus.INFEASIBLE  # no other law is chosen for it
+
+
+def test_a_lift_that_no_time_law_does_in_the_longest_duration_is_proven_infeasible():
+    """With a at most, 1 m takes at least 2 sqrt(1 m / a): 2 s at 1 m/s^2."""
+    task = {"path": LIFT, "duration": {"min": 0.5, "max": 1.9}, "limits": {"platform_acceleration": 1.0}}
+    found = plan(hoist(4.0), task)
+    assert found.status is MotionStatus.INFEASIBLE
+    (excess,) = found.audit.excess
+    assert excess.limit == "platform_acceleration"
+    assert excess.value == pytest.approx(4 / 1.9**2, rel=1e-5)
+    assert plan(hoist(4.0), task | {"duration": {"min": 0.5, "max": 2.05}}).feasible
 
 
 def test_what_only_a_fast_motion_passes_is_passed_and_followed_by_a_rest():
