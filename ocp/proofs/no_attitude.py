@@ -31,11 +31,11 @@ from ..tasks.wind_set import possible_winds_at
 MOST = 30_000  # boxes
 CERTAIN = 1e-5  # [m], of distances, whose formulas are rounded where things touch
 CERTAIN_FORCE = 1e-6  # of the weight, likewise
+AROUND = 10.0  # of the largest arms: a box around all attachments, towards whose corners pulls span all directions
 
 Turned = Callable[[np.ndarray], np.ndarray]
 """Takes offsets from the reference attitude (n, k), and returns poses (n, 6)."""
 Tensions = Callable[[np.ndarray, float], tuple[np.ndarray, np.ndarray]]
-AROUND = 10.0  # of the largest arms: a box around all attachments, towards whose corners pulls span all directions
 """Takes the centres of boxes of offsets (n, k) and half their size [rad]; returns the shortfall of tensions at each
 centre (n,) [N], and a lower bound of their shortfall in the whole box (n,) [N]."""
 

@@ -44,6 +44,7 @@ HALVINGS = 3  # of what limits are tightened by, for offers
 FEWEST = 50  # [%] of the robots: plans for fewer are not offered
 LEAST_ERRORS = 5  # [%] of the given ones: smaller ones are not offered
 Climb = Callable[[Scenario, Deviation | None], Plan]
+"""Plans a scenario from a start."""
 
 
 def too_uncertain(scenario: Scenario, share: float) -> list[Excess]:
@@ -87,9 +88,6 @@ def too_uncertain(scenario: Scenario, share: float) -> list[Excess]:
                 break
             slopes = np.einsum("mr,mrj->mj", change / np.maximum(reach, TINY)[:, None], changes[row])
     return worst
-
-
-"""Plans a scenario from a start."""
 
 
 def for_robots(first: Plan, task: Task, share: float, climb: Climb) -> Plan:

@@ -17,6 +17,7 @@ from .waypoints import WaypointPath
 
 SLOW = 1e-6  # of the largest speed: so slow is at rest
 Curve: TypeAlias = Annotated[RestPath | LinePath | CirclePath | WaypointPath | SamplePath, Field(discriminator="kind")]
+"""A path of any kind but `timed`."""
 
 
 class TimeLaw:
@@ -120,9 +121,6 @@ class SmoothedLaw:
         s, speed, _ = self._law.at(inside)
         sums = self._sums[k] + (inside - knots[k]) * (first + 4 * middle + s) / 6
         return sums + np.maximum(times - knots[-1], 0.0), s, np.where(times == inside, speed, 0.0)
-
-
-"""A path of any kind but `timed`."""
 
 
 class TimedPath(PathBase):
