@@ -341,7 +341,10 @@ TOWLINE_PY(control_move_on) {
         Py_BEGIN_ALLOW_THREADS;
         for (Py_ssize_t row = 0; fits && row < rows; row++) {
             const towline_commanded commanded = {
-                of[TENSIONS] + m * row, rows * m, of[ACTUATION] ? of[ACTUATION] + each * row : NULL, rows * each,
+                of[TENSIONS] + m * row,
+                rows * m,
+                of[ACTUATION] ? of[ACTUATION] + each * row : NULL,
+                rows * each,
                 of[ACCELERATIONS] + 6 * c * row,
             };
             towline_move_on(robot, dt, (int)parts, commanded, of[DISTURBANCE] + 6 * row, of[MEASURED] + motions * row);
