@@ -14,7 +14,7 @@ from ..estimation.logs.encoders import stretched
 from ..estimation.logs.pose_track import PoseTrack, track_of
 from ..estimation.logs.recorded import TO_COMPARE, Recorded
 from ..estimation.logs.recording import GAP
-from ..estimation.logs.smoothing import noise_of, smooth, widest_parabola
+from ..estimation.logs.smoothing import noise_of, smooth, spline_of, widest_parabola
 from ..models import points
 from ..models.dynamics import dynamics_of
 from ..plant import Plant, layout
@@ -217,17 +217,8 @@ class Windows:
         values, of_cables = self._command, tuple(zip(self._command.T, self._lags, strict=True))
         self._signal: Any = lambda at: np.stack([np.interp(at - lag, of.times, one) for one, lag in of_cables], axis=-1)
         if self.drive == "lengths" and len(of.times) >= FEWEST:  # stiff cables feel where lines cut corners
-            from scipy.interpolate import CubicSpline
-
             even = smooth(of.times, values, self._neighbours) if self.measured_command else values
-            spline = CubicSpline(of.times, even)
-
-            def extended(at: np.ndarray) -> np.ndarray:
-                """Return lengths at times that a delay may shift beyond the recording, where cubics would diverge."""
-                near = at.clip(of.times[0], of.times[-1])
-                return spline(near) + spline(near, 1) * (at - near)[..., None]
-
-            self._signal = extended
+            self._signal = spline_of(of.times, even)
         dynamics = dynamics_of(self.robot)
         lengths = np.asarray(dynamics.cable_lengths(self._platform[0], carriers))
         self._cable_speed = np.gradient(lengths, self._dt, axis=1)

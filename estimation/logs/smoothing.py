@@ -1,6 +1,6 @@
 """`Polynomials`, `widest_parabola`: smoothing by polynomials through neighbours, no wider than their noise allows."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import NamedTuple
 
@@ -162,3 +162,16 @@ def roughness(times: np.ndarray, values: np.ndarray, neighbours: int = NEIGHBOUR
     reached = np.cumsum((steps / np.maximum(steps.mean(axis=0), 1e-300)).sum(axis=1)[order], axis=0)
     median = np.take_along_axis(order, (reached < reached[-1] / 2).sum(axis=0)[None], axis=0)
     return np.take_along_axis(off, median, axis=0)[0]
+
+
+def spline_of(times: np.ndarray, values: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the cubic spline through values (n, k) at times (n,), extended by lines, as cubics would diverge."""
+    from scipy.interpolate import CubicSpline
+
+    spline = CubicSpline(times, values)
+
+    def at(wanted: np.ndarray) -> np.ndarray:
+        near = wanted.clip(times[0], times[-1])
+        return spline(near) + spline(near, 1) * (wanted - near)[..., None]
+
+    return at
