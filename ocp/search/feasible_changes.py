@@ -52,8 +52,9 @@ from .refinement import rounded, solved
 from .search import OF_AUDIT, Search
 from .slower import LONGER, longer, longer_duration, longer_phases, other_duration, slower, slower_rate, slower_states
 
-# Of all offers [us]: a second, or half of what the plan took if that is longer, or a few audits as long as its own.
-EFFORT, OF_PLAN, AUDITS = 1e6, 0.5, 3.0
+# Of all offers [us]: one to three seconds, or half of what the plan took if that is longer, or a few audits of its
+# length.
+EFFORT, OF_PLAN, AUDITS = 3e6, 0.5, 3.0
 TRIES = 3  # with other limits, the motion may exceed others
 HALVINGS = 12  # of a margin
 PREFERRED = 1e-3  # of a limit's scale: an excess that costs one, so that other costs hardly matter

@@ -31,7 +31,7 @@ LITTLE = 0.05  # of a limit: what a motion exceeds between nodes where the same 
 TIGHTENED = 1.1  # times what the audit reports, on the same mesh
 LARGEST_SHARE = 0.2  # of a limit, for what one audit reports
 DIGITS = 4  # of what is offered: reports print no more
-PART = 0.6  # of the remaining effort, for one program
+PART = 0.8  # of the remaining effort, for one program
 LEAST_EFFORT = 1e5  # [us]: less finds nothing
 LARGE, FEWEST = 600, 20  # free coordinates at all nodes of a mesh, and its steps
 
