@@ -16,8 +16,7 @@ from towline.estimation.pose.wrong_lengths import wrong_cables
 from towline.models import branches, points, pose_from_lengths
 from towline.models.dynamics import dynamics_of
 from towline.models.record import record_of
-from towline.statics import rest_near as near
-from towline.statics.equilibria import descend, equilibria
+from towline.statics.equilibria import descend, equilibria, rest_near, rests_near
 
 from .framed import framed
 
@@ -479,7 +478,7 @@ def test_newton_finds_the_rests_of_least_energy_with_slack_cables(monkeypatch):
     lengths[np.arange(200), rng.integers(4, size=200)] += np.abs(0.2 * rng.normal(size=200))
     alone = [descend(robot, starts[row], carriers[row], lengths[row]) for row in range(0, 200, 10)]
     monkeypatch.setattr(near, "descend", lambda *_: None)
-    rests, found = near.rests_near(robot, lengths, starts, carriers)
+    rests, found = rests_near(robot, lengths, starts, carriers)
     assert found.mean() > 0.95
     assert (~rests.taut[found]).any(axis=1).mean() > 0.3
     assert (rests.lengths - lengths)[found].max() < 1e-8
@@ -504,7 +503,7 @@ def test_newton_does_not_stay_where_a_load_would_tip_over():
     data = load("multi-quadrotor-4").model_dump()
     robot = Robot.model_validate(data | {"platform": data["platform"] | {"com": (0.0, 0.0, 1.0)}})
     lengths = dynamics_of(robot).cable_lengths(robot.home)
-    rest = near.rest_near(robot, lengths, robot.home, robot.carrier_home)
+    rest = rest_near(robot, lengths, robot.home, robot.carrier_home)
     level = robot.weight * (robot.home[2] + 1.0)
     assert rest.energy < level - 0.1 * robot.weight
 
@@ -514,8 +513,8 @@ def test_newton_knows_that_a_load_on_one_point_turns_freely():
     cables = [cable | {"attachment": (0.0, 0.0, 0.1)} for cable in data["cables"]]
     robot = Robot.model_validate(data | {"cables": cables})
     lengths = dynamics_of(robot).cable_lengths(robot.home)
-    held = near.rest_near(load("multi-quadrotor-4"), lengths, robot.home, robot.carrier_home)
-    assert near.rest_near(robot, lengths, robot.home, robot.carrier_home).neutral
+    held = rest_near(load("multi-quadrotor-4"), lengths, robot.home, robot.carrier_home)
+    assert rest_near(robot, lengths, robot.home, robot.carrier_home).neutral
     assert held is None or not held.neutral
 
 
