@@ -1,5 +1,6 @@
 """Forward kinematics: the pose comes back from its cable lengths, and its covariance is what noise makes of it."""
 
+import sys
 import time
 
 import numpy as np
@@ -460,8 +461,8 @@ def test_rests_take_a_few_newton_steps(monkeypatch):
     robot = load("multi-quadrotor-4")
     lengths = dynamics_of(robot).cable_lengths(robot.home) + np.array([0.02, -0.03, 0.0, 0.02])
     expected = pose_from_lengths(robot, lengths)
-    monkeypatch.setattr(near, "NEWTON", 8)
-    monkeypatch.setattr(near, "descend", lambda *_: None)
+    monkeypatch.setattr(sys.modules[rests_near.__module__], "NEWTON", 8)
+    monkeypatch.setattr(sys.modules[rests_near.__module__], "descend", lambda *_: None)
     start = expected.pose + np.array([0.01, -0.01, 0.01, 0.05, -0.04, 0.03])
     quick = pose_from_lengths(robot, lengths, start)
     assert quick.converged
@@ -477,7 +478,7 @@ def test_newton_finds_the_rests_of_least_energy_with_slack_cables(monkeypatch):
     lengths = dynamics_of(robot).cable_lengths(robot.home + 0.02 * rng.normal(size=(200, 6)), carriers)
     lengths[np.arange(200), rng.integers(4, size=200)] += np.abs(0.2 * rng.normal(size=200))
     alone = [descend(robot, starts[row], carriers[row], lengths[row]) for row in range(0, 200, 10)]
-    monkeypatch.setattr(near, "descend", lambda *_: None)
+    monkeypatch.setattr(sys.modules[rests_near.__module__], "descend", lambda *_: None)
     rests, found = rests_near(robot, lengths, starts, carriers)
     assert found.mean() > 0.95
     assert (~rests.taut[found]).any(axis=1).mean() > 0.3
