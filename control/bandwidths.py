@@ -14,17 +14,18 @@ much of the lag as T permits where the noise permits no more.
 
 The attitude loops of flying carriers, phi'' = -2 h phi' - h^2 phi, are stable up to h lag = 2 with drives that lag
 (Routh), up to h delay = 0.647 with late states (their phase where the gain is 1), and up to h period = 1 with states
-that are held for a period (Jury), each alone. States are predicted over their delay: exactly if they have a time, but a
-delay that is told may be wrong by 30 %, which makes loops unstable as 0.6 of it would. Together they keep
+that are held for a period (Jury), each alone. States are predicted over their delay: exactly if they have a time.
+Without one the delay is that of `sensors`, which may be wrong by 30 %, so that 0.6 of it is taken as not predicted.
+Together they keep
 
     h (lag / 2 + (delay / 0.647 + period) / 1.5) <= 0.5        h >= 6 k
 
 with the bandwidths k of the loops around them, of position and of deviations from the reference. By Routh, those of
 position need h > 2 k without any delay. How far apart steps are is known only later: h is then lowered (control/
-slow_loops.py) so that lag, delay and steps keep the first bound together. Drives whose
-commands lead by a known lag have all of this lag while the commands are at their limits, where a loop with h lag > 2
-oscillates for good. So with all of the lag the bound is 1 in place of 0.5, unless h would be below 15 rad/s (18 rad/s
-with a delay that is told).
+slow_loops.py) so that lag, delay and steps keep the first bound together. Drives whose commands lead by a known lag
+have all of this lag while the commands are at their limits, where a loop with h lag > 2 oscillates for good. So with
+all of the lag the bound is 1 in place of 0.5, unless h would be below 15 rad/s, or 18 rad/s if states without a time
+are late.
 """
 
 from collections.abc import Mapping
@@ -57,7 +58,7 @@ READINGS = 1e3  # [1/s], without a rate
 GRAVITY, TINY = 9.81, 1e-12  # [m/s^2]; what divides
 ATTITUDE = 40.0  # [rad/s]
 USUALLY, AT_LIMITS = 0.5, 1.0  # bounds of h times lateness; where commands at their limits cannot lead
-SLOWEST, WRONG = 15.0, 18.0  # [rad/s], of attitude loops: teams were lost below; where delays are told, wrong by 30 %
+SLOWEST, WRONG = 15.0, 18.0  # [rad/s], of attitude loops: teams were lost below; with a delay that is wrong by 30 %
 SEPARATE = 2.0  # attitude over observers of teams, at least; with 0.9 and late states, teams were handed over
 FREE = 1.5  # times the period of sensors: predictions omit that cables of fixed length tighten
 PLACE, CASCADE = 5.0, 6.0  # bandwidth of position [rad/s]; attitude over it and over that of deviations, at least

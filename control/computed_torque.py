@@ -58,9 +58,9 @@ class ComputedTorque(Controller):
             `bandwidth` and `observer` are lowered, because the loop is unstable from 1 / b on. Both are restored after
             two steps that are closer together. A given bandwidth is kept, with a warning. If carriers fly, all
             bandwidths are lowered by the same factor, because their attitude loops need steps of at most 0.75 /
-            `attitude`, less 1.5 times the mean time for which states are held (if their delay is only told: 0.93 times
-            that), and 0.75 times the remainder of `rotor_lag`. Other carriers that correct errors need steps of at most
-            0.75 / `carrier_bandwidth`.
+            `attitude`, less 1.5 times the mean time for which states are held (without `State.time`: 0.93 times the
+            delay of `sensors`), and 0.75 times the remainder of `rotor_lag`. Other carriers that correct errors need
+            steps of at most 0.75 / `carrier_bandwidth`.
         damping: Damping ratio z: Kd = 2 z b.
         integral: Ki [1/s^3], a number or one for each coordinate. It pauses while the status is not "as planned".
         observer: Bandwidth of the estimates of the disturbance and of forces on flying carriers [rad/s]; 0: no
@@ -269,7 +269,7 @@ class ComputedTorque(Controller):
         self._senses = state.tensions is not None
         seen = time - self._known_age if state.time is None else measured_at(state.time, time)
         since = 0.0 if self._time is None else seen - self._seen
-        late = self._slow_loops.late_by(time - seen, state.time is None, since, dt) if self._flies else 0.0
+        late = self._slow_loops.late_by(time - seen, state.time is not None, since, dt) if self._flies else 0.0
         if dt + late > self._longest and not 0 < self._elapsed <= self._longest - late:
             self._slow_down(min(dt, self._elapsed or dt), late)
         elif self._usual_longest < self._longest < np.inf and 0 < max(dt, self._elapsed) <= self._usual_longest - late:

@@ -45,7 +45,7 @@ class Pending:
     def means(self, ago: float, parts: int, part: float) -> np.ndarray:
         """Return mean commands, (parts, count), in parts of `part` [s], from `ago` [s] before now on.
 
-        What was not commanded is zero.
+        They are zero if nothing has been commanded.
         """
         edges = self.time - ago + part * np.arange(parts + 1)
         first, last = float(edges[0]), float(edges[-1])

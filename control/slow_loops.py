@@ -41,14 +41,15 @@ class SlowLoops:
         """Forget how late states are."""
         self._late, self._for, self._held = 0.0, 0.0, -np.inf
 
-    def late_by(self, age: float, is_told: bool, since: float, dt: float) -> float:
+    def late_by(self, age: float, has_time: bool, since: float, dt: float) -> float:
         """Return the time between steps that delays attitude loops as much as lags and late states do [s].
 
-        States are predicted over their `age` [s], which may be wrong if it is told, and while they are held, until one
-        is newer by `since` [s]. The mean is over all at first, because a loop may be unstable with the first states.
+        States are predicted over their `age` [s], which may be wrong unless the state has its time, and while they are
+        held, until one is newer by `since` [s]. The mean is over all at first, because a loop may be unstable with the
+        first states.
         """
         self._held, self._for = 0.0 if since > 0 else self._held + dt, min(self._for + dt, 1.0)
-        late = TURNED * age if is_told else min(max(self._held, 0.0), OLDEST)
+        late = min(max(self._held, 0.0), OLDEST) if has_time else TURNED * age
         self._late += min(dt / self._for if self._for else 1.0, 1.0) * (late - self._late)
         return LAG * self._lag + ceil(1e3 * self._late - ROUNDING) / 1e3 * PERIOD / DELAY
 

@@ -100,7 +100,7 @@ def worst_of(rows: list[Row], times: np.ndarray, of_plan: bool = False) -> tuple
 def _reached(rows: list[Row], of_plan: bool) -> tuple[np.ndarray, np.ndarray]:
     """Return the least and the largest values that are reached near each instant of one stop, (k, 1, n) each.
 
-    Those of several durations, (k, d, n), are the values at the instants, which are too few to know more.
+    For several durations, (k, d, n), they are the values at the instants: these are too few to tell more.
     """
     values = np.stack([row.values for row in rows])
     if of_plan or values.shape[1] > 1:

@@ -46,7 +46,7 @@ def infeasible_spans(scenario: Scenario, audit: Audit) -> tuple[Certificate, ...
     """Return a certificate of the worst instant of each span without tensions, in order of time.
 
     The certificate's `span` holds the first and the last audited instant of the span [s], its `time` the worst one.
-    Of more than `MOST_SPANS` spans the worst are returned.
+    If there are more than `MOST_SPANS` spans, the worst are returned.
     """
     short = np.concatenate([[False], audit.violation > audit.tolerance, [False]])
     edges = np.flatnonzero(short[1:] != short[:-1]).reshape(-1, 2)  # first row, and the one after the last

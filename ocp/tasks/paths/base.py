@@ -18,7 +18,7 @@ from ....models.part import Part, Pose, Vector3, optional
 class Motion(NamedTuple):
     """Poses over time and their derivatives; times come first, coordinates (x, y, z, roll, pitch, yaw) last.
 
-    Where a path is taken as a curve, the fraction s of it stands for the time and derivatives are by s.
+    For a path as a curve, its fraction s replaces the time, and derivatives are with respect to s.
     """
 
     pose: np.ndarray  # (n, 6) [m, rad]

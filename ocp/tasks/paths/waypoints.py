@@ -49,7 +49,7 @@ class WaypointSpline:
     def __init__(self, points: Sequence[Sequence[float]], times: Sequence[float] | None):
         self._points, self._times = np.array(points), None if times is None else np.array(times)
         self._points[:, 3:] = np.unwrap(self._points[:, 3:], axis=0)
-        self._steps = np.linalg.norm(np.diff(self._points, axis=0), axis=1)  # a radian counts as a metre
+        self._steps = np.linalg.norm(np.diff(self._points, axis=0), axis=1)  # a radian is as long as a metre
 
     def check(self) -> None:
         """Refuse points without times that are too near to each other.
