@@ -33,9 +33,9 @@ from ..models.rotation import inverse_rate_matrix, rotation
 from ..ocp import Planner, Task
 from ..ocp.audits.audit import Audit, audit
 from ..ocp.nlp.solver import FROM_A_SOLUTION
+from ..ocp.tasks.deviation import Deviation
 from ..ocp.tasks.lay_out import lay_out
 from ..ocp.tasks.paths import Motion
-from ..ocp.tasks.scheme import Deviation
 from ..studies.flying.circle import HOVER, tasks
 from .harness import alternating, machine, ratio, table as table_of
 

@@ -18,15 +18,16 @@ from .plan import Plan
 from .search.reference import deviation_from, with_its_reference
 from .search.replanning import Replanner
 from .search.search import Search
-from .search.shortest_durations import Chosen, PathTiming, shortest_durations
+from .search.shortest_durations import Chosen, shortest_durations
 from .search.stops_within import stopping_within
+from .search.time_law import PathTiming
 from .search.uncertain_robots import for_robots, judged
 from .stages import climb
+from .tasks.deviation import Deviation
 from .tasks.initial import Initial
 from .tasks.lay_out import Measured, lay_out
 from .tasks.paths import AnyPath
 from .tasks.scenario import Scenario
-from .tasks.scheme import Deviation
 from .tasks.task import Task, read_task
 
 LEAST_SHARE = 1e-9  # of robots that must keep their limits, or that need not

@@ -15,9 +15,9 @@ from ..statics.robust import RobotShare, share_of_robots
 from .audits.audit import Audit
 from .audits.phase_summary import PhaseSummary, infeasible_spans, summaries
 from .audits.waypoint_distance import WaypointDistance, waypoint_distance
+from .tasks.deviation import Deviation
 from .tasks.paths import Motion
 from .tasks.scenario import Scenario
-from .tasks.scheme import Deviation
 from .tasks.task import MotionStatus
 from .warnings.positions import Instants, between_points, into_each_other, into_places, leaves_its_points, outside_frame
 from .warnings.values import fixed_cables, long_turns, short_cables, slipped_units, weak_formation

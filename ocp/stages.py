@@ -32,9 +32,9 @@ from .search.largest_share import exceeds
 from .search.reference import about_better_reference
 from .search.refinement import refine
 from .search.search import Search
-from .search.shortest_durations import BOUND, audit_of_law, has_own_law
+from .search.time_law import BOUND, audit_of_law, has_own_law
+from .tasks.deviation import Deviation
 from .tasks.ends import between_fixed_values
-from .tasks.scheme import Deviation
 from .tasks.task import MotionStatus
 from .tasks.wind_set import WindDisc
 from .timing.timed_task import ACCELERATIONS, SPEEDS

@@ -16,9 +16,9 @@ from towline.ocp.audits.audit import audit
 from towline.ocp.audits.excess import Excess
 from towline.ocp.audits.violation import relative_violation
 from towline.ocp.search import search
+from towline.ocp.tasks.deviation import Deviation
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.paths import CirclePath, LinePath, RestPath, SamplePath, WaypointPath
-from towline.ocp.tasks.scheme import Deviation
 from towline.statics.equilibria import equilibria
 
 GRAVITY = 9.81

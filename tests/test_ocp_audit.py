@@ -15,8 +15,8 @@ from towline.ocp import MotionStatus, plan
 from towline.ocp.audits.audit import audit
 from towline.ocp.audits.excess import Excess
 from towline.ocp.audits.tensions import few_and_inverse
+from towline.ocp.tasks.deviation import Deviation
 from towline.ocp.tasks.lay_out import lay_out
-from towline.ocp.tasks.scheme import Deviation
 from towline.ocp.tasks.task import read_task
 from towline.ocp.tasks.task_limits import TaskLimits
 

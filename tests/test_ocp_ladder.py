@@ -14,7 +14,7 @@ from towline.ocp.audits.violation import cost
 from towline.ocp.nlp.solver import Solver
 from towline.ocp.proofs.durations import durations
 from towline.ocp.search.reference import deviation_from
-from towline.ocp.search.shortest_durations import fastest
+from towline.ocp.search.time_law import fastest
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task
 from towline.solvers import capacity_margin

@@ -12,8 +12,9 @@ from towline.ocp.nlp.program import build
 from towline.ocp.nlp.rows import Mesh
 from towline.ocp.nlp.solver import Solver
 from towline.ocp.tasks import bernstein
+from towline.ocp.tasks.deviation import Deviation
 from towline.ocp.tasks.lay_out import lay_out
-from towline.ocp.tasks.scheme import SCHEMES, Deviation
+from towline.ocp.tasks.scheme import SCHEMES
 from towline.ocp.tasks.task import Task
 from towline.studies.flying import circle as flying_circle
 from towline.studies.towing import plans as towing_plans

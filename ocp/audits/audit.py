@@ -14,9 +14,9 @@ import numpy as np
 from ...base.display import Displayed
 from ...base.tolerances import INDEPENDENT
 from ...solvers import Certificate
+from ..tasks.deviation import Deviation
 from ..tasks.paths import Motion
 from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, MANY_SAMPLES, MOST_SAMPLES, Scenario, least_audit_rate
-from ..tasks.scheme import Deviation
 from .checks import START_TENSIONS, excesses
 from .clearances import came_too_near
 from .drift import Drift, drift

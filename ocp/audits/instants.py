@@ -1,4 +1,4 @@
-"""The instants of a motion, evaluated for an audit, with tensions within what the motors of winches can give."""
+"""`Instants`: the results of an audit at some instants: motion, tensions, and values of limited quantities."""
 
 from __future__ import annotations
 
@@ -10,62 +10,21 @@ import numpy as np
 
 from ...base.display import Displayed
 from ...base.errors import InputError
-from ...solvers import Certificate, solve_batch
+from ...solvers import Certificate
 from ..limits import Limit, Rate
-from ..limits.cables import WinchForce, WinchPower
 from ..limits.distance import Distance
+from ..tasks.deviation import Deviation
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
-from ..tasks.scheme import Deviation
 from .by_phase import distribution, taken_up
+from .motors import within_motors
 from .tensions import in_all_winds, scaled, with_all_loads
 
-SPARES = 0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2  # of the weight: what exceeds motors where that is necessary, in order
 OF_INSTANTS = (
     *("times", "tensions", "off_path", "A", "w", "tensions_unlimited", "gains", "violation", "supports"),
     *("other_w", "other_tensions"),
 )
 MOTIONS = ("motion", "carriers")
-
-
-def within_motors(
-    scenario: Scenario, times: np.ndarray, A: np.ndarray, case: tuple[np.ndarray, np.ndarray], values: list[np.ndarray]
-) -> np.ndarray:
-    """Return the tensions (n, m) [N] of a motion, within the force and power of motors wherever such exist.
-
-    At each instant of a motion a motor's limit is one of the tension: its force is the tension and what accelerates the
-    winch, its power the tension times a speed. Where none exist, they exceed what motors can by little, if such exist;
-    at all other instants the tensions are the given ones.
-
-    - `A`: Wrench matrices with moments over `Robot.length`, (n, 6, m).
-    - `case`: Wrenches with the same moments, (n, 6) [N], and their tensions so far, (n, m) [N].
-    - `values`: What each limit bounds for these tensions, (n, k) each.
-    """
-    w, tensions = case
-    low, high = scenario.bounds_at(times)
-    least, most = np.full_like(low, -np.inf), np.full_like(high, np.inf)  # that motors permit
-    for limit, its in zip(scenario.limits, values, strict=True):
-        if isinstance(limit, WinchForce):
-            reflected = its - tensions[:, limit.cables]
-            most[:, limit.cables] = limit.high - reflected
-            least[:, limit.cables] = -limit.high - reflected
-        elif isinstance(limit, WinchPower) and limit.soft is None:
-            held = scenario.in_force(limit, times)[:, None] & (its != 0)
-            own = np.divide(limit.high * tensions, np.abs(its), np.full_like(most, np.inf), where=held)
-            most = np.minimum(most, own)
-    exceeded = np.any((tensions > np.minimum(high, most)) | (tensions < np.maximum(low, least)), axis=1)
-    if not exceeded.any():
-        return tensions
-    chosen = tensions.copy()
-    for spare in SPARES:
-        by = spare * scenario.robot.force_scale
-        lowest, highest = np.maximum(low, least - by), np.minimum(high, most + by)
-        rows = np.flatnonzero(exceeded & (lowest <= highest).all(axis=1))
-        if rows.size:
-            found = solve_batch(A[rows], w[rows], lowest[rows], highest[rows], tensions[rows])
-            chosen[rows[found.feasible]] = found.tensions[found.feasible]
-            exceeded[rows[found.feasible]] = False
-    return chosen
 
 
 @dataclass(frozen=True)

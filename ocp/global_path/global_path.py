@@ -25,10 +25,10 @@ from ...base.display import Displayed
 from ...base.text import quantity
 from ..nlp.guess import formation_guess, guess_through, usual_guess
 from ..search.search import Search
+from ..tasks.deviation import Deviation
 from ..tasks.ends import carrier_ends, fixed_values
 from ..tasks.paths.line import rest_to_rest
 from ..tasks.scenario import ATTITUDE, Scenario
-from ..tasks.scheme import Deviation
 from .at_rest import AtRest
 from .clear_space import FORMATIONS, ClearSpace, grown
 from .space import Space

@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from ..tasks.deviation import Deviation
 from ..tasks.ends import carrier_ends, platform_ends
 from ..tasks.paths import WaypointPath
 from ..tasks.scenario import POSITION, Scenario
-from ..tasks.scheme import Deviation
 from .at_rest import AtRest, Kept, unsure
 from .clear_space import ClearSpace
 

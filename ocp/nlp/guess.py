@@ -18,10 +18,10 @@ import numpy as np
 from ...base.display import Displayed
 from ..limits.carriers import CarrierAcceleration, CarrierSpeed
 from ..limits.distance import Distance
+from ..tasks.deviation import Deviation
 from ..tasks.ends import carrier_ends, fixed_values, platform_ends
 from ..tasks.paths import Motion
 from ..tasks.scenario import POSITION, Scenario
-from ..tasks.scheme import Deviation
 
 DISTANCES = ("keep_out", "cable_clearance", "cable_platform_clearance", "carrier_separation", "platform_box")
 PLACES = 120  # along the path; the first time every second

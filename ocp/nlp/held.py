@@ -13,10 +13,10 @@ import numpy as np
 
 from ...solvers import solve_batch
 from ..limits import Angle, Limit, Rate
+from ..tasks.deviation import Deviation
 from ..tasks.ends import between_fixed_values, fixed_values
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
-from ..tasks.scheme import Deviation
 
 EASE = 0.1  # of the duration, after which all of a limit is tightened
 

@@ -14,20 +14,8 @@ from ..tasks import bernstein
 from ..tasks.bernstein import Values
 from ..tasks.scenario import Scenario
 from .derivatives import Constraints, Part, part_of
-from .rows import (
-    DURATION,
-    OTHER_COSTS,
-    Layout,
-    Mesh,
-    Row,
-    bounded,
-    costs_at,
-    in_world,
-    motions,
-    reference_symbols,
-    spread,
-    stretch,
-)
+from .layout import DURATION, Layout
+from .rows import OTHER_COSTS, Mesh, Row, bounded, costs_at, in_world, motions, reference_symbols, spread, stretch
 
 TAKE_UP = 3.0  # cost of a rate on the ground: with so much, tensions rise there nearly linearly
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
-from ..tasks.scheme import Deviation
+from ..tasks.deviation import Deviation
 from .derivatives import Block
 from .program import Program
 from .solver import Outcome, Progress, Solver

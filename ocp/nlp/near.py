@@ -13,8 +13,8 @@ from ...base.display import Displayed
 from ..limits import Limit
 from ..limits.limits import Limits
 from ..limits.places import Inside
+from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
-from ..tasks.scheme import Deviation
 
 BEND = 0.25  # of what a point moves in an interval: more than an arc is away from its chord
 

@@ -29,15 +29,17 @@ import numpy as np
 from ...base.display import Displayed
 from ..limits import Limit
 from ..tasks import bernstein
+from ..tasks.deviation import Deviation
 from ..tasks.ends import carrier_ends, fixed_values, platform_ends
 from ..tasks.lay_out_phases import known_tensions
 from ..tasks.scenario import ATTITUDE, START_BAND, Scenario
-from ..tasks.scheme import Deviation
 from .derivatives import Block, Columns, Mapped, Part, derivatives
+from .grid import Grid, passed
 from .held import eased, held_wrench
 from .interval import points
+from .layout import DURATION, MARGIN, Layout
 from .near import Near, has_places, parts
-from .rows import DURATION, MANY, MARGIN, Grid, Layout, Mesh, Row, Tightening, passed, stretch
+from .rows import MANY, Mesh, Row, Tightening, stretch
 from .stages import Stages, reference_motions
 
 LEGS = 0.3, 3.0  # times its duration in the motion before: what one of a leg may be

@@ -1,10 +1,9 @@
-"""Rows and unknowns of a program's nodes and intervals, and its parts as functions of their columns."""
+"""Define what the parts of a program share: its mesh, its rows, and the motions that its unknowns stand for."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -14,76 +13,13 @@ from ...base.display import Displayed
 from ..limits import Limit
 from ..limits.places import BodyOutside
 from ..tasks.bernstein import Values
-from ..tasks.paths import WaypointPath
 from ..tasks.scenario import POSITION, Scenario
 from .held import Spans, held_spans
+from .layout import DURATION, MARGIN, Layout
 
-DURATION, MARGIN = "duration", "margin"
 OTHER_COSTS = 1e-6  # of all but the missing wrench, in the elastic program: which is then the least there is
 MANY = 12  # free coordinates: robots with more are teams
 STEPS = 4  # a motion is rarely that many times as fast as its reference
-LEAST = 4  # steps of a phase, where there are enough
-
-
-@dataclass(frozen=True)
-class Layout(Displayed):
-    """The column of a point.
-
-    Each node carries a copy of what all nodes share, the duration and the margin, equal to the copy of the next node,
-    so that the program stays banded.
-    """
-
-    # the number of free coordinates, and how many of these and their derivatives are unknowns
-    n: int
-    derivatives: int
-    # the number of decisive winds of a box or of extreme loads, and of forces of the ground
-    winds: int
-    grounds: int
-    # the names of the soft limits, and of what all nodes share
-    soft: tuple[str, ...]
-    carried: tuple[str, ...]
-    # rows of the column with the free coordinates, their rates and accelerations
-    q: slice
-    v: slice
-    a: slice
-    # jerk and snap of a smooth scheme, times the first and second power of an interval's length at the scenario's
-    # duration: so they are of the size of a. Empty for other schemes.
-    jerk: slice
-    snap: slice
-    # tensions in units of the robot's force: the planned ones, and those in each decisive wind or with each extreme
-    # load, one after another
-    tensions: slice
-    wind_tensions: slice
-    supports: slice  # the forces of the ground, in the same unit; zero where the platform hangs
-    missing: slice  # an elastic program's missing wrenches: as planned, then in each decisive wind
-    slacks: slice  # the excesses over soft limits, in their scale
-    shared: slice  # the shared unknowns
-    width: int  # how many unknowns a node has
-
-    @staticmethod
-    def of(scenario: Scenario, elastic: bool) -> Layout:
-        """Return the layout that a scenario needs."""
-        carried = [DURATION] * (scenario.duration_range is not None)
-        carried += [MARGIN] * (scenario.task.objective.margin is not None)
-        soft = tuple(dict.fromkeys(limit.name for limit in scenario.limits if limit.soft is not None))
-        n, m, winds, grounds = scenario.count, scenario.robot.m, scenario.decisive, scenario.phases.supports
-        smooth = n * scenario.scheme.smooth
-        sizes = [n, n, n, smooth, smooth, m, winds * m, grounds, 6 * (1 + winds) * elastic, len(soft), len(carried)]
-        ends = np.cumsum([0, *sizes]).tolist()
-        slices = (slice(*pair) for pair in pairwise(ends))
-        return Layout(n, scenario.scheme.derivatives, winds, grounds, soft, tuple(carried), *slices, width=ends[-1])
-
-    def slack_of(self, limit: str) -> int:
-        """Return the index of a soft limit's slack."""
-        return self.slacks.start + self.soft.index(limit)
-
-    def slack(self, x: ca.SX, limit: Limit) -> ca.SX | None:
-        """Return the slack of a limit in column x; None if the limit is hard."""
-        return None if limit.soft is None else x[self.slack_of(limit.name)]
-
-    def at(self, name: str) -> int | None:
-        """Return the index of a shared unknown; None if there is none."""
-        return self.shared.start + self.carried.index(name) if name in self.carried else None
 
 
 class Row(NamedTuple):
@@ -239,52 +175,3 @@ def swept(scenario: Scenario, mesh: Mesh) -> dict[Limit, ca.Function]:
     thin = [limit for limit in thin if isinstance(limit, BodyOutside) == (scenario.count > MANY)]
     functions = {limit: scenario.limits.on_the_way(limit) for limit in thin}
     return {limit: function for limit, function in functions.items() if function is not None}
-
-
-@dataclass(frozen=True)
-class Grid(Displayed):
-    """The points of a program."""
-
-    shares: np.ndarray  # where all points are, inner ones too, (k,), from 0 to 1 of the duration
-    weights: np.ndarray  # of the mean over the duration, at the points, (k,)
-    steps: np.ndarray  # the length of each interval at the scenario's duration, (n,) [s]
-    # The duration of the phase on the ground of which an interval is a part, (n,) [s]; 0: it is of none.
-    take_up: np.ndarray
-
-    @staticmethod
-    def of(scenario: Scenario, steps: int) -> Grid:
-        """Return the grid of so many steps."""
-        scheme, phases = scenario.scheme, scenario.phases
-        boundaries = (
-            phases.boundaries / phases.boundaries[-1] if phases.all else np.array([0.0, *passed(scenario), 1.0])
-        )
-        durations = np.diff(boundaries) * scenario.duration
-        rests = [phase.rests for phase in phases.all] or [False] * len(durations)
-        counts = _counts(durations, steps)
-        starts = np.append(0, np.cumsum(counts))
-        shares = np.interp(scheme.shares(steps), starts / steps, boundaries)
-        shares[starts * scheme.size] = boundaries
-        lengths = np.repeat(durations / counts, counts)
-        weights = scheme.quadrature(lengths / scenario.duration)
-        return Grid(shares, weights, lengths, np.repeat(durations * rests, counts))
-
-    @property
-    def intervals(self) -> np.ndarray:
-        """Return what an interval's rows need to know of it: its length and `take_up`, (2, n) [s]."""
-        return np.stack([self.steps, self.take_up])
-
-
-def passed(scenario: Scenario) -> list[float]:
-    """Return the shares of the duration at which a leg ends and the next one begins, if their durations are free."""
-    path = scenario.path
-    knots = path.knots(scenario.duration) / scenario.duration if isinstance(path, WaypointPath) else []
-    return [float(share) for share in knots[1:-1]] if scenario.passing else []
-
-
-def _counts(durations: np.ndarray, steps: int) -> np.ndarray:
-    """Return how many of the steps each phase has, in proportion to its duration but not too few."""
-    least = max(min(LEAST, steps // len(durations)), 1)
-    counts = np.full(len(durations), least)
-    for _ in range(steps - counts.sum()):
-        counts[int((durations / counts).argmax())] += 1
-    return counts

@@ -16,8 +16,8 @@ import numpy as np
 from ...base.display import Displayed
 from ...base.errors import InputError, SolverError
 from ...base.inputs import shown
+from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
-from ..tasks.scheme import Deviation
 from .guess import initial_guess
 from .program import Program
 from .rows import MANY

@@ -28,23 +28,11 @@ from ..tasks.paths import RestPath
 from ..tasks.scenario import Scenario
 from ..tasks.wind_set import decisive_winds
 from .derivatives import Constraints, Differentiable, Part, function_of, part_of
+from .grid import Grid
 from .held import Spans, at_ends, held_spans
 from .interval import interval_of
-from .rows import (
-    MARGIN,
-    OTHER_COSTS,
-    Grid,
-    Layout,
-    Mesh,
-    Row,
-    bounded,
-    costs_at,
-    in_world,
-    motions,
-    reference_symbols,
-    spread,
-    swept,
-)
+from .layout import MARGIN, Layout
+from .rows import OTHER_COSTS, Mesh, Row, bounded, costs_at, in_world, motions, reference_symbols, spread, swept
 
 ACCELERATION = 2  # order of a hull: of lower ones an interval has all points, its ends too
 SLACK_COST = 1e2  # of a missing wrench as large as the weight

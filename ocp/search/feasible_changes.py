@@ -21,10 +21,10 @@ from ..plan import Plan
 from ..proofs.durations import durations
 from ..proofs.infeasible_ends import infeasible_ends
 from ..result import Offers, Relaxed
+from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out, with_task
 from ..tasks.paths import CirclePath
 from ..tasks.scenario import Scenario
-from ..tasks.scheme import Deviation
 from ..tasks.task import MotionStatus, Task, Tube
 from ..tasks.task_limits import TaskLimits
 from .largest_share import Change, Maker, at_ease, by_programs, exceeds, largest_share, rests, together

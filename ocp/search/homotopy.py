@@ -6,7 +6,7 @@ from ..nlp.guess import balanced
 from ..nlp.near import has_places, jumps
 from ..nlp.rows import MANY, Mesh
 from ..nlp.solver import CIRCLING, Outcome
-from ..tasks.scheme import Deviation
+from ..tasks.deviation import Deviation
 from .search import Search
 
 COARSE = 50  # steps: from four times as many on, the program of so few is solved first

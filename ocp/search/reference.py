@@ -18,18 +18,20 @@ from ...base.text import quantity, quantity_row
 from ...models.parsing import validate
 from ...models.part import Part
 from ..audits.violation import cost
+from ..nlp.grid import Grid
 from ..nlp.guess import initial_guess
-from ..nlp.rows import MANY, Grid, Mesh
+from ..nlp.rows import MANY, Mesh
 from ..nlp.solver import Outcome
 from ..plan import Plan
+from ..tasks.deviation import Deviation
 from ..tasks.ends import platform_ends
 from ..tasks.paths import AnyPath, LinePath, PathBase, RestPath, TimedPath, WaypointPath
 from ..tasks.scenario import ATTITUDE, Scenario
-from ..tasks.scheme import LINEAR, Deviation
+from ..tasks.scheme import LINEAR
 from ..tasks.task import MotionStatus
 from ..timing.fastest_law import FastestLaw
 from .search import Search
-from .shortest_durations import fastest
+from .time_law import fastest
 
 STEPS, LEAST_STEPS, FEW = 7, 4, 28  # of each leg; of all
 WINDOW = 3.0  # steps, over which the fastest law is smoothed

@@ -15,8 +15,8 @@ from ..nlp.rows import Mesh
 from ..nlp.solver import Outcome
 from ..plan import Plan
 from ..proofs.infeasible_ends import infeasible_ends
+from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
-from ..tasks.scheme import Deviation
 from ..tasks.task import MotionStatus
 from .search import Search, ended
 

@@ -11,13 +11,13 @@ from ...models import Robot
 from ..nlp.rows import Mesh
 from ..nlp.solver import Progress, Solver
 from ..plan import Plan
+from ..tasks.deviation import Deviation
 from ..tasks.ends import Word, carrier_ends, platform_ends
 from ..tasks.initial import Final, Initial, check_ends
 from ..tasks.lay_out import carrier_paths, initial_of
 from ..tasks.paths import AnyPath, Motion, RestPath, ReturnPath
 from ..tasks.paths.sequence import decay
 from ..tasks.scenario import ATTITUDE, Scenario
-from ..tasks.scheme import Deviation
 from ..tasks.task import FreeBase, GivenBase
 from .search import Search
 

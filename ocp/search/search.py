@@ -13,20 +13,22 @@ from ...base.text import counted, quantity
 from ..audits.audit import Audit, audit
 from ..audits.excess import TENSIONS
 from ..audits.violation import relative_violation
+from ..nlp.grid import Grid
 from ..nlp.guess import initial_guess, usual_guess
 from ..nlp.linear import LinearDistances
 from ..nlp.near import Near, has_places, jumps
 from ..nlp.program import Program, build
-from ..nlp.rows import Grid, Mesh
+from ..nlp.rows import Mesh
 from ..nlp.solver import CIRCLING, MOST_ITERATIONS, SETTLED, TIME_LIMIT, Outcome, Progress, Solver
 from ..nlp.stages import Stages
 from ..nlp.waiting import raise_if_swallowed, wait_for
 from ..plan import Plan
 from ..result import PlannerStep
+from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
-from ..tasks.scheme import Deviation, SchemeName
+from ..tasks.scheme import SchemeName
 from ..tasks.task import MotionStatus
-from .shortest_durations import PathTiming
+from .time_law import PathTiming
 
 NEAR = 0.08  # of a motion's extent: where a place is, of which a program has rows the first time
 FEW = 8  # regions

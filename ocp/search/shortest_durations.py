@@ -1,4 +1,4 @@
-"""Choose durations of phases and of paths that dwell: `shortest_durations`; the fastest time law: `fastest`.
+"""Choose durations of phases, and of paths that dwell, from their ranges: `shortest_durations`.
 
 Each is the shortest that is feasible.
 """
@@ -7,10 +7,9 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
 from typing import NamedTuple
 
-from ...base.errors import InputError, SolverError
+from ...base.errors import InputError
 from ...base.text import quantity
 from ...models.part import PositiveRange
 from ..audits.audit import Audit, audit
@@ -21,71 +20,13 @@ from ..proofs.infeasible_ends import infeasible_ends
 from ..result import PlannerStep
 from ..tasks.lay_out import lay_out
 from ..tasks.lay_out_phases import LEAST_INSTANTS
-from ..tasks.paths import LinePath, RestPath, SequencePath, WaypointPath
+from ..tasks.paths import SequencePath
 from ..tasks.scenario import AUDIT_RATE, Scenario
-from ..tasks.task import MotionStatus, Task, Tube
-from ..tasks.task_limits import TaskLimits
-from ..timing.time_along import time_along
-from ..timing.timed_task import WITHOUT_POWER
+from ..tasks.task import MotionStatus, Task
+from .time_law import BOUND, audit_of_law, fastest
 
-BOUND = 0.99  # of the fastest law's time on its grid: no law is faster than this
 LEAST = LEAST_INSTANTS / AUDIT_RATE  # [s], that a phase may last
 CLOSE = 1e-3  # relative: from the shortest duration that is feasible
-
-
-class PathTiming:
-    """Durations and time laws that the path of a scenario allows, computed once for all durations."""
-
-    def __init__(self, scenario: Scenario):
-        self._scenario = scenario
-
-    @cached_property
-    def durations(self) -> Durations | None:
-        """Return the durations that the path allows with its own time law; None if they are not known."""
-        return durations(self._scenario)
-
-    @cached_property
-    def fastest(self) -> tuple[Plan | None, str]:
-        """Return the fastest law along the path, or None, and the message."""
-        return fastest(self._scenario)
-
-
-def fastest(scenario: Scenario) -> tuple[Plan | None, str]:
-    """Return the fastest law along the path of a scenario whose duration alone is free, or None, and the message.
-
-    `stop_within`, powers of winches, whose law is a local optimum, and limits that `time_along` does not know are left
-    out: its time is a lower bound even so.
-    """
-    task = scenario.task
-    if not all(isinstance(path, RestPath) for path in scenario.carrier_paths.values()):
-        return None, "not computed: carriers have time laws of their own"
-    if scenario.wind_set is not None:
-        return None, "not computed: in moving air the drag is not proportional to the square of the speed"
-    if has_own_law(scenario):
-        return None, f"not computed: the path of kind {task.path.kind} has a time law of its own"
-    hard = {name: getattr(task.limits, name) for name in WITHOUT_POWER if name not in task.limits.soft}
-    alone = {"limits": TaskLimits(**hard), "margin": scenario.hard_margin, "tube": Tube(), "stop_within": None}
-    try:
-        found = time_along(scenario.robot, task.model_copy(update=alone))
-    except (InputError, SolverError) as error:
-        return None, f"not computed: {str(error).removeprefix('time_along: ')}"
-    if found.feasible:
-        return found, f"the fastest time law takes {quantity(found.duration, 's', 6)}"
-    at = 0.0 if found.law is None else found.law.at or 0.0
-    return found, f"{found.status.value} at {quantity(100 * at, '%', 3)} of the path"
-
-
-def has_own_law(scenario: Scenario) -> bool:
-    """Return whether no other time law is chosen for a path."""
-    path = scenario.task.path
-    own = path.natural_duration is not None or getattr(path, "timing", "") == "uniform"
-    return own or not isinstance(path, LinePath | WaypointPath)
-
-
-def audit_of_law(law: Plan, scenario: Scenario) -> Audit | None:
-    """Return the audit of the fastest law if it is one of all limits of the scenario, else None."""
-    task = scenario.task.model_copy(update={"path": law.scenario.task.path, "duration": None})
-    return law.audit if task == law.scenario.task else None
 
 
 class Chosen(NamedTuple):

@@ -21,10 +21,10 @@ from ..audits.audit import audit
 from ..audits.excess import Excess
 from ..plan import Plan
 from ..result import Offers, PlannerStep, Relaxed
+from ..tasks.deviation import Deviation
 from ..tasks.lay_out import with_task
 from ..tasks.paths import TimedPath
 from ..tasks.scenario import Scenario
-from ..tasks.scheme import Deviation
 from ..tasks.task import MotionStatus
 from .refinement import planned, rounded
 from .search import Search

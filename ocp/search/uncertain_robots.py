@@ -28,9 +28,9 @@ from ..audits.robust_margin import RobustMargin, closest_to_limit
 from ..audits.tensions import scaled, tolerance_of
 from ..plan import Plan
 from ..result import Offers, PlannerStep, Relaxed
+from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out
 from ..tasks.scenario import Scenario
-from ..tasks.scheme import Deviation
 from ..tasks.task import MotionStatus, Task
 
 PLACES = 41

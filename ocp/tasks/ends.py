@@ -8,9 +8,9 @@ import numpy as np
 
 from ...models import Robot
 from . import bernstein
+from .deviation import Deviation
 from .paths import AnyPath, LinePath, RestPath, SequencePath, WaypointPath
 from .scenario import POSITION, Scenario
-from .scheme import Deviation
 from .task import FreeBase, GivenBase, Task
 
 AT_REST = 1e-9  # [m/s, rad/s] and per second: rounding at the end of a path

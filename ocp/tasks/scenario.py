@@ -30,9 +30,10 @@ from ..costs.terms import (
 )
 from ..limits.limit import Hull, Limit
 from ..limits.limits import Limits
+from .deviation import Deviation
 from .paths import AnyPath, Motion, RestPath, TimedPath, WaypointPath
 from .phase import LaidPhase, Phases
-from .scheme import LINEAR, SCHEMES, Deviation, Scheme
+from .scheme import LINEAR, SCHEMES, Scheme
 from .task import FreeBase, Task
 from .wind_set import WindBox, WindDisc, WindSet, as_wind, possible_winds_at
 
