@@ -123,8 +123,22 @@ def test_where_the_own_time_law_is_too_fast_in_the_longest_duration_the_fastest_
     found = plan(hoist(4.0), task)
     assert found.feasible
     assert ("timing" in [stage.name for stage in found.stages]) == (share < 1)
-    uniform = plan(hoist(4.0), task | {"path": {**LIFT, "timing": "uniform"}, "limits": {"platform_speed": 0.49}})
-    assert uniform.status is MotionStatus.INFEASIBLE  # no other law is chosen for it
+    late = plan(hoist(4.0), task | {"duration": {"min": 1.9, "max": 2}})
+    assert late.feasible
+    assert 1.9 <= late.duration <= 2.0  # the fastest takes less, and is followed by a rest
+
+
+def test_a_uniform_line_has_no_other_time_law_and_is_proven_infeasible():
+    """The fastest cable, by differences of its length, is a little faster than its mean speed permits to tell."""
+    robot, shares = load("cogiro"), np.linspace(0, 1, 2001)
+    start, end = np.array([-3, 1, robot.home[2]]), np.array([3, 1, robot.home[2]])
+    poses = np.hstack([start + shares[:, None] * (end - start), np.zeros((2001, 3))])
+    lengths = np.linalg.norm(poses[:, None, :3] + robot.attachments - robot.home_anchors, axis=2)
+    peak = np.abs(np.diff(lengths, axis=0)).max() / shares[1] / 4.0
+    path = {"kind": "line", "start": start.tolist(), "end": end.tolist(), "timing": "uniform"}
+    for share, status in ((0.99, MotionStatus.INFEASIBLE), (1.01, MotionStatus.FEASIBLE)):
+        task = {"path": path, "duration": {"min": 1, "max": 4}, "limits": {"cable_speed": share * peak}}
+        assert plan(robot, task).status is status
 
 
 def test_a_lift_that_no_time_law_does_in_the_longest_duration_is_proven_infeasible():
