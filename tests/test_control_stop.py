@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from towline import Dynamics, InputError, Planner, Robot, export_fmu, load, plan, simulate
 from towline.control import Predictive, Stop, longest_stop, references, stop
 from towline.models.parsing import to_yaml
-from towline.ocp.search import shortest_durations, stops_within
+from towline.ocp.search import stops_within, time_law
 from towline.solvers import batch
 
 from .framed import framed
@@ -125,8 +125,8 @@ def test_the_fastest_motion_may_stop_as_it_was_planned_to():
 def test_a_duration_with_a_stop_that_takes_too_long_is_known_from_some_of_its_stops(monkeypatch):
     counts, all_of = [], stops_within.longest_stop_along
     monkeypatch.setattr(stops_within, "longest_stop_along", lambda *call: counts.append(len(call[2])) or all_of(*call))
-    laws, fastest = [], shortest_durations.fastest
-    monkeypatch.setattr(shortest_durations, "fastest", lambda scenario: laws.append(scenario) or fastest(scenario))
+    laws, fastest = [], time_law.fastest
+    monkeypatch.setattr(time_law, "fastest", lambda scenario: laws.append(scenario) or fastest(scenario))
     path = {"kind": "line", "start": [-0.4, 0, 0.8], "end": [0.5, 0.2, 1.2]}
     task = {"path": path, "duration": {"min": 0.2, "max": 9}, "objective": {"time": 0.05}, "stop_within": 0.25}
     found = plan("point-mass-3", task)
