@@ -292,7 +292,7 @@ class Predictive(ComputedTorque):
             return
         if not self._carried.is_later(self._seen):  # of tensions that bore another load
             self._watch.interrupt()
-        end, otherwise = start.copy(), self._has_winches * KNOWN * (self._cables["known"] - self._cables["then"])
+        end, otherwise = start.copy(), KNOWN * (self._cables["known"] - self._cables["then"])
         models = self._carried.records_between(before, self._seen)
         self._sent_lately.move_on(time - before, models, end, otherwise, known, self._accelerations)
         self._before = self._seen, motions.copy(), self._platform["disturbance"].copy()

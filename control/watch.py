@@ -71,12 +71,12 @@ class Watch:
     """Compare measured velocities with the model's prediction for the commands that were sent.
 
     Over the last `WINDOW` the velocity should change by the integral of the model's accelerations, from each measured
-    state to the next one, with the tensions sent and the disturbance estimated from the earlier state. The mean
-    difference over the window is the unexplained acceleration. States that arrive late are compared with
-    the prediction for their time: a disturbance is unexplained until the observer knows it, whatever the delay. New
-    plans and jumps of the reference do not contribute, because they act through the commands. States that are further
-    apart than `PAUSE` are not compared, nor those before and after more than `blind` without a state. If nothing was
-    compared for longer than `UNCHECKED`, a warning is given once.
+    state to the next one, with the tensions sent, half of what sensors report in addition, and the disturbance
+    estimated from the earlier state. The mean difference over the window is the unexplained acceleration. States that
+    arrive late are compared with the prediction for their time: a disturbance is unexplained until the observer knows
+    it, whatever the delay. New plans and jumps of the reference do not contribute, because they act through the
+    commands. States that are further apart than `PAUSE` are not compared, nor those before and after more than `blind`
+    without a state. If nothing was compared for longer than `UNCHECKED`, a warning is given once.
 
     - `scale`: factors that make velocities of all coordinates comparable, (6,): 1, and lengths [m] for angles; 0 for
       locked coordinates.

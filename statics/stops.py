@@ -62,14 +62,17 @@ def _unloaded(robot: Robot, trajectory: Trajectory, times: list[float]) -> Itera
     instants = cache(lambda window: instants_of(robot, trajectory, WINDOW * window))  # for all stops and attempts
     bounds = cache(lambda window, reserve: instants(window).bounds(reserve))
     for first in range(0, len(times), AT_ONCE):
-        best = dict[float, _Tried]()
+        best, tried = dict[float, _Tried](), set[tuple[float, bytes]]()  # times and laws
         for attempt in (*ATTEMPTS, None):
             laws = {
                 each: _braking(PathLimits(bounds, each, end, *attempt)) if attempt else _planned(trajectory, each, end)
                 for each in times[first : first + AT_ONCE]
                 if each not in best or best[each].rank[0]
             }
-            laws = {each: _refined(law) for each, law in laws.items() if law is not None}
+            # Few cables give hardly any other wrench than the plan's, so several attempts are the same motion.
+            made = {each: (each, np.stack(law).tobytes()) for each, law in laws.items() if law is not None}
+            laws = {each: _refined(law) for each, law in laws.items() if law is not None and made[each] not in tried}
+            tried.update(made.values())
             for each, audited in zip(laws, _audited(robot, trajectory, [*laws.values()]) if laws else (), strict=True):
                 best[each] = min([*([best[each]] if each in best else []), audited], key=lambda its: its.rank)
         for _, found, worst in best.values():
@@ -124,8 +127,8 @@ def _braking(limits: PathLimits) -> _Law:
 def _planned(trajectory: Trajectory, begins: float, end: float) -> _Law | None:
     """Return the plan's own law until it rests, soon or at its end, which brakes hardest if it is fastest; or None."""
     early, late = begins, min(begins + WINDOW, end)
-    for _ in range(3):  # at a corner the platform rests for an instant
-        tau = np.append(np.linspace(early, late, 1000), end)
+    for _ in range(4):  # at a corner the platform rests for an instant
+        tau = np.append(np.linspace(early, late, 200), end)
         speed = np.max([np.abs(motion[1]).reshape(len(tau), -1).max(axis=1) for motion in trajectory.at(tau)], axis=0)
         soon, near = int(speed[:-1].argmin()), tau[1] - tau[0]
         early, late = max(tau[soon] - near, begins), min(tau[soon] + near, end)

@@ -14,6 +14,7 @@ from towline.control import Predictive, Stop, longest_stop, references, stop
 from towline.models.parsing import to_yaml
 from towline.ocp.search import stops_within, time_law
 from towline.solvers import batch
+from towline.statics import stops
 
 from .framed import framed
 from .told import told
@@ -397,3 +398,21 @@ def test_a_stop_carries_the_load_of_its_phase(tmp_path):
         InputError, match="reference must begin without a load, because exported units have none, got one of 60"
     ):
         export_fmu(robot, tmp_path / "stop.fmu", reference=halt)
+
+
+def test_no_motion_is_audited_twice_for_a_stop(monkeypatch):
+    """Three cables give no other wrench than the plan's, so all attempts at a stop were the same motion.
+
+    Their audits took most of the time of a stop, which is limited to ten milliseconds.
+    """
+    robot, laws = load("wang-ctmrts"), []
+    home = list(robot.home[:3])
+    path = {"kind": "line", "start": home, "end": [home[0] + 0.05, home[1] + 0.04, home[2] + 0.1]}
+    found = plan(robot, {"path": path, "duration": 2, "base": {"kind": "free"}})
+    audited = stops._audited
+    monkeypatch.setattr(stops, "_audited", lambda *given: (laws.extend(given[2]), audited(*given))[1])
+    its = stop(found, 0.8)
+    assert its.feasible
+    assert len(laws) > 1
+    for one, other in itertools.combinations(laws, 2):
+        assert one.times.shape != other.times.shape or not np.array_equal(np.stack(one), np.stack(other))
