@@ -5,9 +5,6 @@ corners of a box they are rounded, so that a program can pass them. Inside a box
 
 Which face, edge or end is nearest is decided by comparisons, which have no derivatives. The distance then is a formula
 of that one alone, so its derivatives cost no more than for two lines, however many faces there are.
-
-Which faces count is decided by comparisons, which have no derivatives. The distance then is a formula of those alone:
-a program differentiates some twenty products, however many pairs of faces there are.
 """
 
 from functools import cache, lru_cache
@@ -16,12 +13,10 @@ from typing import Any, NamedTuple, TypeAlias
 import casadi as ca
 import numpy as np
 
-from ...models.part import Pose, Vector3
 from ...models.polyhedron import Polyhedron
 from ...models.shapes import Block, Capsule, ConvexMesh, Shape, Sphere
 
 Point: TypeAlias = Any  # (3, 1), SX or DM
-_Height: TypeAlias = tuple[Any, Any]  # height above a face at the start of a segment, and its change to the end [m]
 _FLAT = 1e-12  # share of a segment's squared length: less of it along the axes that count is a segment beside the box
 _TINY_GAP = 1e-20  # [m^2], keeps the root's derivative finite where things touch
 _NO_LENGTH = 1e-20  # [m^2], of a cable without length
@@ -29,9 +24,15 @@ _PARALLEL = 1e-12  # squared sine of the angle of two lines below which any poin
 _ROUNDING = 1e-12  # of the size of a body
 _FINE = 2.0**-40  # of a segment
 _CUTS = 6  # each a cutting plane and a bisection: of the place where a cable is deepest
-Place: TypeAlias = Shape
 _TINY = 1e-12  # [m^2], keeps the root's derivative finite where things touch
 _SHORT = 1e-18  # [m^2], of a segment that is a point
+
+
+class _Line(NamedTuple):
+    """A height above a face along a segment: at its start, and its change to the end [m]."""
+
+    start: Any
+    slope: Any
 
 
 def within_segment(share: Any) -> Any:
@@ -87,8 +88,8 @@ def _depth(low: Point, high: Point, p: Point, p_end: Point) -> Any:
     along = p_end - p
     forward = ca.if_else(along >= 0, 1.0, -1.0)
     before, half, slope = forward * (p - (low + high) / 2), (high - low) / 2, forward * along
-    falling = [(-(before + half)[i], -slope[i]) for i in range(3)]
-    rising = [((before - half)[i], slope[i]) for i in range(3)]
+    falling = [_Line(-(before + half)[i], -slope[i]) for i in range(3)]
+    rising = [_Line((before - half)[i], slope[i]) for i in range(3)]
     meetings = [ca.vertcat(*(_meeting(fall, rise) for rise in rising)) for fall in falling]
     deepest = ca.mmax(ca.vertcat(*meetings))
     left = _first([ca.mmax(row) >= deepest for row in meetings])
@@ -97,12 +98,11 @@ def _depth(low: Point, high: Point, p: Point, p_end: Point) -> Any:
     return _meeting(_weighted(left, falling), _weighted(right, rising))
 
 
-def _meeting(falling: _Height, rising: _Height) -> Any:
+def _meeting(falling: _Line, rising: _Line) -> Any:
     """Return the least of the larger of two heights, value and slope at the start, over a segment [m]."""
-    (fall, down), (rise, up) = falling, rising
-    change = up - down
-    share = within_segment((fall - rise) / ca.if_else(change > 0, change, 1.0))
-    return ca.fmax(fall + share * down, rise + share * up)
+    change = rising.slope - falling.slope
+    share = within_segment((falling.start - rising.start) / ca.if_else(change > 0, change, 1.0))
+    return ca.fmax(*(line.start + share * line.slope for line in (falling, rising)))
 
 
 def _first(holds: list[Any]) -> list[Any]:
@@ -114,36 +114,16 @@ def _first(holds: list[Any]) -> list[Any]:
     return chosen
 
 
-def _weighted(chosen: list[Any], lines: list[_Height]) -> _Height:
-    value, slope = (sum(one * line[k] for one, line in zip(chosen, lines, strict=True)) for k in range(2))
-    return value, slope
+def _weighted(chosen: list[Any], lines: list[_Line]) -> _Line:
+    return _Line(*(sum(one * line[k] for one, line in zip(chosen, lines, strict=True)) for k in range(2)))
 
 
-def point_outside_mesh(place: ConvexMesh, p: Point) -> Any:
-    """Return the distance of p from a convex mesh [m], negative inside."""
-    return _functions(place.vertices, place.scale, place.pose).of_point(p)
-
-
-def cable_outside_mesh(place: ConvexMesh, p: Point, p_end: Point) -> Any:
-    """Return the distance of the segment from p to p_end from a convex mesh [m], negative inside."""
-    return _functions(place.vertices, place.scale, place.pose).of_cable(p, p_end)
-
-
-class _Functions(NamedTuple):
-    of_point: ca.Function
-    of_cable: ca.Function
-
-
-@lru_cache(maxsize=64)
-def _functions(vertices: tuple[Vector3, ...], scale: float, pose: Pose) -> _Functions:
-    """Return the functions of a point and of a segment's ends: their operations are written once for all cables."""
-    body = ConvexMesh(kind="mesh", vertices=vertices, scale=scale, pose=pose).body
-    p, p_end = ca.SX.sym("p", 3), ca.SX.sym("p_end", 3)
-    options = {"cse": True}
-    return _Functions(
-        ca.Function("point_outside_mesh", [p], [_point_outside(body, p)], options),
-        ca.Function("cable_outside_mesh", [p, p_end], [_cable_outside(body, p, p_end)], options),
-    )
+@lru_cache(maxsize=128)
+def _outside_mesh(place: ConvexMesh, ends: int) -> ca.Function:
+    """Return the function of a point or of both ends of a segment: its operations are written once for all cables."""
+    points = [ca.SX.sym(f"p{i}", 3) for i in range(ends)]
+    outside = _point_outside(place.body, *points) if ends == 1 else _cable_outside(place.body, *points)
+    return ca.Function("outside_mesh", points, [outside], {"cse": True})
 
 
 def _chosen(rows: np.ndarray, where: Any) -> Any:
@@ -230,13 +210,6 @@ def _deepest(body: Polyhedron, p: Any, p_end: Any) -> Any:
     return ca.fmax(*(line.start + share * line.slope for line in lines))
 
 
-class _Line(NamedTuple):
-    """A height along a segment: at its start, and its change to the end [m]."""
-
-    start: Any
-    slope: Any
-
-
 def _crossing(low: Any, high: Any, left: _Line, right: _Line, flat: Any = None) -> Any:
     """Return where a line that falls on the left meets one that rises on the right; else the lower end, or `flat`."""
     rise = right.slope - left.slope
@@ -294,7 +267,7 @@ def between_cables(p: Point, p_end: Point, q: Point, q_end: Point) -> Any:
     return between_points(p + s * along, q + within_segment(t) * across)
 
 
-def point_outside(place: Place, p: Point) -> Any:
+def point_outside(place: Shape, p: Point) -> Any:
     """Return the distance of p from an obstacle [m], negative inside."""
     if isinstance(place, Sphere):
         return between_points(p, ca.DM(place.centre)) - place.radius
@@ -306,11 +279,11 @@ def point_outside(place: Place, p: Point) -> Any:
         most = ca.mmax(beyond)
         return ca.if_else(most <= 0, most, ca.sqrt(ca.sumsqr(ca.fmax(beyond, 0.0)) + _TINY))
     if isinstance(place, ConvexMesh):
-        return point_outside_mesh(place, p) - place.rounding
+        return _outside_mesh(place, 1)(p) - place.rounding
     raise TypeError(f"{type(place).__name__} is not an obstacle")
 
 
-def cable_outside(place: Place, p: Point, p_end: Point) -> Any:
+def cable_outside(place: Shape, p: Point, p_end: Point) -> Any:
     """Return the distance of the segment from p to p_end from an obstacle [m], negative inside."""
     if isinstance(place, Sphere):
         return _from_segment(ca.DM(place.centre), p, p_end) - place.radius
@@ -320,7 +293,7 @@ def cable_outside(place: Place, p: Point, p_end: Point) -> Any:
         ends = (_before_turn(place, p), _before_turn(place, p_end))
         return segment_outside_box()(ca.DM(place.min), ca.DM(place.max), *ends)
     if isinstance(place, ConvexMesh):
-        return cable_outside_mesh(place, p, p_end) - place.rounding
+        return _outside_mesh(place, 2)(p, p_end) - place.rounding
     raise TypeError(f"{type(place).__name__} is not an obstacle")
 
 

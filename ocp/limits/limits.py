@@ -61,6 +61,7 @@ class Limits(Displayed):
     all: tuple[Limit, ...]
     _ways: dict[Limit, ca.Function | None] = field(default_factory=dict, init=False, repr=False)
     _separating: dict[Limit, Separating] = field(default_factory=dict, init=False, repr=False)
+    _blocks: dict[tuple[Limit, ...], ca.Function] = field(default_factory=dict, init=False, repr=False)
 
     def __iter__(self) -> Iterator[Limit]:
         return iter(self.all)
@@ -78,6 +79,10 @@ class Limits(Displayed):
     @property
     def _bodies(self) -> list[Body]:
         return [self._state.platform, *self._state.carriers]
+
+    @property
+    def _others(self) -> list[ca.SX]:
+        return [self._state.tensions, self._state.off_path]
 
     @cached_property
     def _values(self) -> list[ca.SX]:
@@ -100,8 +105,7 @@ class Limits(Displayed):
         Its inputs are the motion of the platform in {G} (18: pose, velocity, acceleration), those of all carriers (18
         each), the tensions [N] (m) and the platform's offset from its path (6).
         """
-        others = [self._state.tensions, self._state.off_path]
-        return of_motions("limits", self._bodies, others, [ca.vertcat(*self._values)])
+        return of_motions("limits", self._bodies, self._others, [ca.vertcat(*self._values)])
 
     @cached_property
     def places(self) -> list[slice]:
@@ -178,42 +182,36 @@ class Limits(Displayed):
         - `tensions`: (n, m) [N]; where they are nan, so are the values that depend on them. Default: zeros.
         - `off_path`: offset of the platform from its path, (n, 6) [m, rad]. Default: zeros.
         """
-        if not self.all:
-            return []
-        n = len(platform[0])
-        arguments = motions(platform, carriers)
-        arguments.append(np.zeros((n, self.robot.m)) if tensions is None else tensions)
-        arguments.append(np.zeros((n, 6)) if off_path is None else off_path)
-        (values,) = in_blocks(self._of_block if distances else self._without_distances, arguments)
-        counts = [its.numel() if distances or not isinstance(limit, Distance) else 0 for limit, its in self._each]
-        return np.split(values, np.cumsum(counts)[:-1], axis=1)
+        chosen = tuple(limit for limit in self if distances or not isinstance(limit, Distance))
+        found = dict(zip(chosen, self._along(chosen, platform, carriers, tensions, off_path), strict=True))
+        return [found[limit] if limit in found else np.zeros((len(platform[0]), 0)) for limit in self]
 
     def distances(self, limit: Distance, platform: Motion, carriers: Motion) -> np.ndarray:
         """Return the distances of one limit along a motion in {G}, (n, k) [m]."""
-        if limit not in self._of_distance:
-            values = [self._values[self.all.index(limit)]]
-            self._of_distance[limit] = of_motions("distances", self._bodies, [], values).map(BLOCK)
-        return in_blocks(self._of_distance[limit], motions(platform, carriers))[0]
-
-    @cached_property
-    def _of_distance(self) -> dict[Limit, ca.Function]:
-        return {}
+        return self._along((limit,), platform, carriers)[0]
 
     def at_rest(self, platform: np.ndarray, carriers: np.ndarray) -> list[np.ndarray]:
         """Return the values of each limit at poses of platform (n, 6) and carriers (n, c, 6) at rest, (n, k)."""
         moving, bases = ((pose, np.zeros_like(pose), np.zeros_like(pose)) for pose in (platform, carriers))
         return self.along(moving, bases)
 
-    @property
-    def _each(self) -> Iterator[tuple[Limit, ca.SX]]:
-        return zip(self, self._values, strict=True)
-
-    @cached_property
-    def _of_block(self) -> ca.Function:
-        return self.function.map(BLOCK)
-
-    @cached_property
-    def _without_distances(self) -> ca.Function:
-        others = [self._state.tensions, self._state.off_path]
-        values = [its for limit, its in self._each if not isinstance(limit, Distance)]
-        return of_motions("limits", self._bodies, others, [ca.vertcat(*values)]).map(BLOCK)
+    def _along(
+        self,
+        chosen: tuple[Limit, ...],
+        platform: Motion,
+        carriers: Motion,
+        tensions: np.ndarray | None = None,
+        off_path: np.ndarray | None = None,
+    ) -> list[np.ndarray]:
+        """Return the values of some of the limits, as `along` does."""
+        if not chosen:
+            return []
+        values = [self._values[self.all.index(limit)] for limit in chosen]
+        if chosen not in self._blocks:
+            self._blocks[chosen] = of_motions("limits", self._bodies, self._others, [ca.vertcat(*values)]).map(BLOCK)
+        n = len(platform[0])
+        arguments = motions(platform, carriers)
+        arguments.append(np.zeros((n, self.robot.m)) if tensions is None else tensions)
+        arguments.append(np.zeros((n, 6)) if off_path is None else off_path)
+        (found,) = in_blocks(self._blocks[chosen], arguments)
+        return np.split(found, np.cumsum([its.numel() for its in values])[:-1], axis=1)

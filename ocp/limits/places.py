@@ -18,7 +18,7 @@ from ...models import Robot, kinematics
 from ...models.part import Box
 from ...models.shapes import Shape, Skeleton, skeleton
 from .cables import names
-from .clearance import Place, cable_outside, point_outside
+from .clearance import cable_outside, point_outside
 from .distance import Distance, Pair
 from .state import State
 
@@ -36,7 +36,7 @@ class Outside(Distance):
 
     per_metre = 1.0
 
-    def __init__(self, place: Place, called: str, riding: bool, least: float):
+    def __init__(self, place: Shape, called: str, riding: bool, least: float):
         self.place, self.called, self._riding, self.low = place, called, riding, least
         self.thickness = place.thickness
         if riding:  # what is far from the platform moves farther in its frame than its points in {G}
@@ -83,7 +83,7 @@ class PlatformOutside(_PointsOutside):
 
     name = "keep_out"
 
-    def __init__(self, robot: Robot, place: Place, called: str, least: float):
+    def __init__(self, robot: Robot, place: Shape, called: str, least: float):
         super().__init__(place, called, False, least)
         points, body = np.vstack([robot.platform.com, robot.attachments]), robot.platform.body
         outside = [body is None or float(point_outside(body, ca.DM(point))) > ON_BODY for point in points]
@@ -98,7 +98,7 @@ class PlatformOutside(_PointsOutside):
 class CarriersOutside(_PointsOutside):
     """Keep the origins of carriers out of a region."""
 
-    def __init__(self, robot: Robot, which: Sequence[int], place: Place, called: str, riding: bool, least: float):
+    def __init__(self, robot: Robot, which: Sequence[int], place: Shape, called: str, riding: bool, least: float):
         super().__init__(place, called, riding, least)
         self.name = "carrier_platform_clearance" if riding else "keep_out"
         self.labels = tuple(robot.carriers[index].name for index in which)
@@ -112,7 +112,7 @@ class CarriersOutside(_PointsOutside):
 class CablesOutside(Outside):
     """Keep the cables out of a region."""
 
-    def __init__(self, robot: Robot, place: Place, called: str, riding: bool, least: float):
+    def __init__(self, robot: Robot, place: Shape, called: str, riding: bool, least: float):
         super().__init__(place, called, riding, least)
         self.name = "cable_platform_clearance" if riding else "keep_out"
         self.labels = names(robot)
@@ -155,7 +155,7 @@ class BodyOutside(Outside):
         return ca.vertcat(*(self.values(state) for state in states))
 
 
-def body_outside(body: Shape, whose: str, place: Place, called: str, least: float) -> Iterator[Distance]:
+def body_outside(body: Shape, whose: str, place: Shape, called: str, least: float) -> Iterator[Distance]:
     """Yield the limits that keep a body in the platform's frame out of a region in {G}, by `least` [m]."""
     own, its = skeleton(body), skeleton(place)
     if its.solid or not own.solid:
