@@ -16,6 +16,7 @@ from .polyhedron import Polyhedron, convex_hull, polyhedron, read_stl
 DENT = 1e-5  # of its size by which a convex surface may be inside its hull: files have 7 digits
 THINNEST = 1e-5  # [m] of a body or place: distances are rounded by a tenth of it where things touch
 SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))  # of a box's corners
+EDGES = np.array([pair for pair in combinations(range(8), 2) if np.abs(np.diff(SIGNS[[*pair]], axis=0)).sum() == 2])
 
 
 class _Round:
@@ -89,6 +90,12 @@ class Block(Part):
     def axes(self) -> np.ndarray:
         """Return the directions of its edges as columns, (3, 3) [-]."""
         return np.eye(3) if self.attitude is None else rotations(np.array(self.attitude))
+
+    @property
+    def body(self) -> Polyhedron:
+        """Return its faces and edges in its frame [m]."""
+        corners, normals = self.centre + (SIGNS * self.half) @ self.axes.T, np.vstack([self.axes.T, -self.axes.T])
+        return Polyhedron(normals, (corners @ normals.T).max(axis=0), corners[EDGES], corners)
 
 
 class ConvexMesh(Part):
@@ -191,9 +198,6 @@ def _dent(body: Polyhedron, triangles: np.ndarray) -> float:
     return deepest
 
 
-EDGES = [pair for pair in combinations(range(8), 2) if np.abs(SIGNS[pair[0]] - SIGNS[pair[1]]).sum() == 2]
-
-
 class BodySphere(Sphere):
     """A ball that is fixed in a frame."""
 
@@ -261,7 +265,4 @@ def skeleton(shape: Shape) -> Skeleton:
     if isinstance(shape, Capsule):
         ends = np.array([shape.start, shape.end])
         return Skeleton(ends, ends[None], False, shape.rounding)
-    if isinstance(shape, Block):
-        corners = shape.centre + (SIGNS * shape.half) @ shape.axes.T
-        return Skeleton(corners, corners[np.array(EDGES)], True, shape.rounding)
     return Skeleton(shape.body.corners, shape.body.edges, True, shape.rounding)

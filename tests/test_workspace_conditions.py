@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from towline.base.errors import InputError
 from towline.models import Dynamics, Robot, load
+from towline.models.shapes import BodyHull
 from towline.solvers import capacity_margin, solve
 from towline.statics.distribution import pose_problem
 from towline.statics.equilibria import equilibria
@@ -30,7 +31,7 @@ from towline.workspace import (
     WrenchWithTolerance,
     condition_from,
 )
-from towline.workspace.conditions.interference import segment_distance
+from towline.workspace.conditions.interference import outside, segment_distance
 
 CUBE = ((-5.0, -5.0, -5.0, -1.0, -1.0, -1.0), (5.0, 5.0, 5.0, 1.0, 1.0, 1.0))
 
@@ -352,6 +353,19 @@ def test_cables_keep_away_from_obstacles():
         held = Interference(obstacles=[obstacles[kind]], clearance=0.1).holds(robot, places)
         np.testing.assert_array_equal(held[sure], least[sure] > 0.1)
         assert 0 < held.sum() < 80
+
+
+def test_a_rounded_hull_is_nearer_by_its_radius():
+    """Distance of segments from the platform's body in a design, by points along them."""
+    low, high = np.array([-0.5, -0.3, -0.1]), np.array([0.5, 0.3, 0.1])
+    hull = BodyHull(kind="mesh", vertices=tuple(itertools.product(*zip(low, high, strict=True))), radius=0.2)
+    p, q = np.random.default_rng(5).uniform(-1.5, 1.5, (2, 60, 3))
+    along = p[:, None] + np.linspace(0, 1, 2001)[:, None] * (q - p)[:, None]
+    least = np.linalg.norm(along - np.clip(along, low, high), axis=2).min(axis=1)
+    found = outside(hull, p, q)
+    np.testing.assert_allclose(found[least > 0], (least - 0.2)[least > 0], atol=1e-3)
+    assert (found[least == 0] <= -0.2).all()
+    assert (least == 0).any()
 
 
 def test_a_cable_through_an_obstacle_is_not_free_whatever_its_kind():

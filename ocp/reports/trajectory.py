@@ -12,7 +12,6 @@ from ...figures import plan as plan_figures
 from ...figures.drawing import Drawing
 from ...figures.limits import limits
 from ...figures.plan import convergence, phase_plane
-from ...figures.robot import box_edges
 from ...figures.scene import outline_variables
 from ...figures.views import views
 from ...models.motion_file import dimensions, motion_variables, over
@@ -81,9 +80,7 @@ def output_rows(plan: PlanData) -> np.ndarray:
 
 def outline(place: AnyKeepOut) -> list[np.ndarray]:
     """Return lines (n, 3) in {G} [m] along the surface of a keep-out region."""
-    if isinstance(place, Block):
-        return [place.centre + edge @ place.axes.T for edge in box_edges(-place.half, place.half)]
-    if isinstance(place, ConvexMesh):
+    if isinstance(place, Block | ConvexMesh):
         return list(place.body.edges)
     if isinstance(place, Sphere):
         centre = np.array(place.centre)

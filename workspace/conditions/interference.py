@@ -14,10 +14,9 @@ from ...models import Robot
 from ...models.part import Box, NonNegative, Positive, optional
 from ...models.points import anchors, attachments, in_frame
 from ...models.polyhedron import Polyhedron
-from ...models.shapes import Block, Capsule, ConvexMesh, Sphere
+from ...models.shapes import Block, Capsule, ConvexMesh, Sphere, skeleton
 from ..condition import Condition, Places
 
-_BISECTIONS = 40  # of a cable: its point nearest to a box, to 1e-12 of its length
 _ROUNDING = 1e-12  # of the size of a mesh
 
 
@@ -109,38 +108,17 @@ def cable_distances(robot: Robot, starts: np.ndarray, ends: np.ndarray) -> dict[
 
 def outside(obstacle: Obstacle, p: np.ndarray, p_end: np.ndarray) -> np.ndarray:
     """Return the distance of the segments p to p_end (n, 3) from an obstacle, (n,) [m]; at most 0 where they meet."""
-    if isinstance(obstacle, Block):
-        before_turn = [(end - obstacle.centre) @ obstacle.axes for end in (p, p_end)]
-        return _from_box(-obstacle.half, obstacle.half, *before_turn)
-    if isinstance(obstacle, ConvexMesh):
-        return _from_mesh(obstacle.body, p, p_end)
-    if isinstance(obstacle, Sphere):
-        start = end = np.array(obstacle.centre)
-    else:
-        start, end = np.array(obstacle.start), np.array(obstacle.end)
-    shape = p.shape
-    return segment_distance(p, p_end, np.broadcast_to(start, shape), np.broadcast_to(end, shape)) - obstacle.radius
+    nearest, its = np.full(len(p), np.inf), skeleton(obstacle)
+    for part in its.parts:  # of a body with faces the nearest place is on an edge, or on a face below an end
+        start, end = (np.broadcast_to(part[k], p.shape) for k in (0, -1))
+        nearest = np.minimum(nearest, segment_distance(p, p_end, start, end))
+    if isinstance(obstacle, Block | ConvexMesh):
+        nearest = _with_faces(obstacle.body, p, p_end, nearest)
+    return nearest - its.radius
 
 
-def _from_box(low: np.ndarray, high: np.ndarray, p: np.ndarray, p_end: np.ndarray) -> np.ndarray:
-    """Return the distance of segments from a box, zero inside; it is convex on a segment: bisection minimises it."""
-    along = p_end - p
-    first, last = np.zeros(len(p)), np.ones(len(p))
-    for _ in range(_BISECTIONS):
-        middle = (first + last) / 2
-        at = p + middle[:, None] * along
-        falling = _dot(at - np.clip(at, low, high), along) < 0
-        first, last = np.where(falling, middle, first), np.where(falling, last, middle)
-    at = p + last[:, None] * along
-    return np.linalg.norm(at - np.clip(at, low, high), axis=1)
-
-
-def _from_mesh(body: Polyhedron, p: np.ndarray, p_end: np.ndarray) -> np.ndarray:
-    """Return the distance of segments from a convex body, zero inside: from its edges, or of an end from a face."""
-    nearest = np.full(len(p), np.inf)
-    for start, end in body.edges:
-        corner, other = (np.broadcast_to(point, p.shape) for point in (start, end))
-        nearest = np.minimum(nearest, segment_distance(p, p_end, corner, other))
+def _with_faces(body: Polyhedron, p: np.ndarray, p_end: np.ndarray, nearest: np.ndarray) -> np.ndarray:
+    """Return the distance of segments from a convex body, (n,), from that of its edges: zero where they meet it."""
     for end in (p, p_end):
         heights = body.beyond(end)
         height = heights.max(axis=1)
