@@ -31,20 +31,12 @@ def names(robot: Robot) -> tuple[str, ...]:
 
 
 class EachCable(Limit):
-    """Limit the size of a value of each cable, of either sign."""
-
-    def __init__(self, robot: Robot, most: float):
-        self.low, self.high, self.scale = -most, most, most
-        self.labels = names(robot)
-
-
-class SomeCables(EachCable):
-    """Limit the size of a value of some cables, by their indices; default: of all."""
+    """Limit the size of a value, of either sign, of some cables, by their indices; default: of all."""
 
     def __init__(self, robot: Robot, most: float, cables: Sequence[int] | None = None):
-        super().__init__(robot, most)
+        self.low, self.high, self.scale = -most, most, most
         self.cables = list(range(robot.m) if cables is None else cables)
-        self.labels = tuple(self.labels[cable] for cable in self.cables)
+        self.labels = tuple(names(robot)[cable] for cable in self.cables)
 
     @classmethod
     def each(cls, robot: Robot, bounds: Sequence[float | None]) -> Iterator[Self]:
@@ -54,7 +46,7 @@ class SomeCables(EachCable):
                 yield cls(robot, most, [cable for cable, its in enumerate(bounds) if its == most])
 
 
-class CableSpeed(SomeCables):
+class CableSpeed(EachCable):
     """Limit the rate of the length of some cables, that is, the speed of their winches."""
 
     name, unit = "cable_speed", "m/s"
@@ -64,7 +56,7 @@ class CableSpeed(SomeCables):
         return state.cable_speeds[self.cables]
 
 
-class CableAcceleration(SomeCables):
+class CableAcceleration(EachCable):
     """Limit the second derivative of each cable's length, that is, the acceleration of its winch."""
 
     name, unit = "cable_acceleration", "m/s^2"
@@ -90,7 +82,7 @@ class WinchPower(EachCable):
         return state.tensions * state.cable_speeds
 
 
-class WinchForce(SomeCables):
+class WinchForce(EachCable):
     """Limit the force of each winch's motor, without friction: the tension less inertia times cable acceleration.
 
     The bound is what friction leaves of the motor's force when the winch hauls in, also while it pays out: to correct

@@ -80,7 +80,7 @@ def durations(scenario: Scenario, shares: np.ndarray | None = None) -> Durations
         return np.stack(each, axis=1).reshape(-1, 6)[:, rows] * scale / robot.force_scale
 
     A, places = (np.repeat(values, len(loads), axis=0) for values in (A, shares))
-    c = wrenches(*(Motion(body.pose, 0 * body.pose, 0 * body.pose) for body in (platform, carriers)))
+    c = wrenches(Motion.still(platform.pose), Motion.still(carriers.pose))
     # T_0 is the duration with wrenches of the size of the robot's forces: others lose the digits of X or of d.
     d, whole = np.zeros_like(c), scenario.duration
     for _ in range(2):

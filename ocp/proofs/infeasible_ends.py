@@ -8,7 +8,7 @@ obstacle changes by at most the distance that points of the platform can move in
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import casadi as ca
 import numpy as np
@@ -54,28 +54,70 @@ class InfeasibleEnds(NamedTuple):
 
 def infeasible_ends(scenario: Scenario) -> InfeasibleEnds | None:
     """Return the proof that a task is impossible, if its ends or a path that it must follow show it; else None."""
-    times = np.concatenate([[0.0, scenario.duration], np.linspace(0.0, scenario.duration, PLACES)[1:-1]])
-    freedom = [_freedom(scenario, 0), _freedom(scenario, -1), _freedom(scenario, None)]
-    platform, carriers = _at_places(scenario, times, freedom)
-    proven = _exceeded(scenario, times, freedom, platform, carriers)
-    proven += _stretched(scenario, times, freedom, platform, carriers)
+    task = _Known.of(scenario)
+    proven = _exceeded(task) + _stretched(task)
     known = {(excess.limit, excess.about) for excess in proven}
-    given = _given(freedom, len(times))
-    bodies = [Motion(*(part[given] for part in motion)) for motion in (platform, carriers)]
-    hurried = [*_hurried(scenario, times, freedom, platform, carriers)]
-    hurried += too_weak_carriers(scenario, times[given], *bodies)
+    given = task.given
+    hurried = [*_hurried(task)]
+    hurried += too_weak_carriers(scenario, task.times[given], task.platform.at(given), task.carriers.at(given))
     durations = [excess for excess in hurried if excess.limit == OF_DURATION]
     proven += [max(durations, key=lambda excess: excess.bound)] if durations else []
     known |= {(excess.limit, excess.about) for excess in durations}
     proven += [excess for excess in hurried if (excess.limit, excess.about) not in known]
-    proven += too_heavy(scenario, _resting(freedom, platform, carriers))
-    certificate = _without_tensions(scenario, times, freedom, platform, carriers)
-    if certificate is None:
-        certificate = _beyond_reach(scenario, times, freedom, platform, carriers)
+    proven += too_heavy(scenario, task.resting())
+    certificate = _without_tensions(task) or _beyond_reach(task)
     if not proven and certificate is None:
-        proven += _at_no_attitude(scenario, times, freedom, platform, carriers) or no_cycle(scenario)
-        proven += blocked_tube(scenario, platform.pose[:2], lambda k, point: _reach(scenario, freedom[k], point[None]))
+        proven += _at_no_attitude(task) or no_cycle(scenario)
+        proven += blocked_tube(scenario, task.platform.pose[:2], lambda k, point: task.reach(k, point[None]))
     return InfeasibleEnds(proven, certificate) if proven or certificate is not None else None
+
+
+class _Known(NamedTuple):
+    """The motion of a task at its start, its end and places between, in this order, and the freedom of its values."""
+
+    scenario: Scenario
+    times: np.ndarray  # (n,) [s]
+    freedom: list[np.ndarray]  # at start, end and between: of each value of platform and carriers, (1 + c, 3, 6)
+    platform: Motion  # in {G}, where it is given
+    carriers: Motion  # likewise
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Self:
+        """Return what is known of the motion of a task."""
+        times = np.concatenate([[0.0, scenario.duration], np.linspace(0.0, scenario.duration, PLACES)[1:-1]])
+        platform, carriers = scenario.motion(times, None)
+        owners = scenario.owners()
+        for fixed in fixed_values(scenario):
+            owner, coordinate = owners[fixed.column]
+            where = (coordinate,) if owner is None else (owner, coordinate)
+            if owner is not None or not scenario.relative:
+                (platform if owner is None else carriers)[fixed.order][(abs(fixed.end), *where)] += fixed.value
+        return cls(scenario, times, [_freedom(scenario, end) for end in (0, -1, None)], platform, carriers)
+
+    @property
+    def which(self) -> np.ndarray:
+        """Return which entry of `freedom` each time has, (n,)."""
+        return np.minimum(np.arange(len(self.times)), 2)
+
+    @property
+    def given(self) -> np.ndarray:
+        """Return at which times the whole motion of the platform is given, (n,)."""
+        return ~np.array([each[0].any() for each in self.freedom])[self.which]
+
+    def reach(self, which: int, points: np.ndarray | None = None) -> float:
+        """Return how far points of the platform (k, 3) can be from where the reference has them [m]; default: any."""
+        robot, tube, freedom = self.scenario.robot, self.scenario.task.tube, self.freedom[which]
+        if points is None:
+            points = np.vstack([robot.attachments, robot.platform.com, self.scenario.body_corners])
+        turns = tube.turn * (freedom[0, 0, list(ATTITUDE)] == NEAR).sum()
+        moves = tube.radius if (freedom[0, 0, :3] == NEAR).any() else 0.0
+        return float(moves + turns * np.linalg.norm(points, axis=1).max())
+
+    def resting(self, count: int = 6) -> np.ndarray:
+        """Return which of platform and carriers have no speed in the first coordinates at both ends, (2, 1 + c)."""
+        speeds = np.concatenate([self.platform.velocity[:2, None], self.carriers.velocity[:2]], axis=1)[:, :, :count]
+        given = np.stack([self.freedom[end][:, 1, :count] == GIVEN for end in (0, 1)])
+        return np.all(given & (np.abs(speeds) < AT_REST), axis=2)
 
 
 def _freedom(scenario: Scenario, end: int | None) -> np.ndarray:
@@ -105,48 +147,14 @@ def _freedom(scenario: Scenario, end: int | None) -> np.ndarray:
     return freedom
 
 
-def _kinds(count: int) -> np.ndarray:
-    """Return which entry of `freedom` each of `count` times has: start, end, or between."""
-    return np.array([0, 1] + [2] * (count - 2))
-
-
-def _given(freedom: list[np.ndarray], count: int) -> np.ndarray:
-    """Return at which of `count` times the whole motion of the platform is given."""
-    return ~np.array([each[0].any() for each in freedom])[_kinds(count)]
-
-
-def _at_places(scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray]) -> tuple[Motion, Motion]:
-    """Return the motion in {G} of platform and carriers at start, end and points between, where it is given."""
-    platform, carriers = scenario.motion(times, None)
-    owners = scenario.owners()
-    for fixed in fixed_values(scenario):
-        owner, coordinate = owners[fixed.column]
-        where = (coordinate,) if owner is None else (owner, coordinate)
-        if owner is not None or not scenario.relative:
-            (platform if owner is None else carriers)[fixed.order][(abs(fixed.end), *where)] += fixed.value
-    return platform, carriers
-
-
-def _reach(scenario: Scenario, freedom: np.ndarray, points: np.ndarray | None = None) -> float:
-    """Return how far points of the platform (k, 3) can be from where the reference has them [m]; default: any."""
-    robot, tube = scenario.robot, scenario.task.tube
-    if points is None:
-        points = np.vstack([robot.attachments, robot.platform.com, scenario.body_corners])
-    turns = tube.turn * (freedom[0, 0, list(ATTITUDE)] == NEAR).sum()
-    moves = tube.radius if (freedom[0, 0, :3] == NEAR).any() else 0.0
-    return float(moves + turns * np.linalg.norm(points, axis=1).max())
-
-
-def _exceeded(
-    scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
-) -> list[Excess]:
+def _exceeded(task: _Known) -> list[Excess]:
     """Return the limits that are exceeded whatever the planner chooses, each where it is exceeded by most."""
-    limits, exceeded = scenario.limits, []
-    values = limits.along(platform, carriers, None, scenario.off_path(times, platform, carriers))
+    scenario, times, limits, exceeded = task.scenario, task.times, task.scenario.limits, []
+    values = limits.along(task.platform, task.carriers, None, scenario.off_path(times, task.platform, task.carriers))
     worst: dict[int, tuple[float, Excess]] = {}
     for which, rows in enumerate((slice(0, 1), slice(1, 2), slice(2, None))):
-        chosen, near = _dependent(scenario, freedom[which])
-        reach = _reach(scenario, freedom[which])
+        chosen, near = _dependent(scenario, task.freedom[which])
+        reach = task.reach(which)
         for k, (limit, place) in enumerate(zip(limits, limits.places, strict=True)):
             if limit.soft is not None or isinstance(limit, Rate) or not (found := values[k][rows]).size:
                 continue
@@ -160,47 +168,44 @@ def _exceeded(
     return exceeded
 
 
-def _at_no_attitude(
-    scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
-) -> list[Excess]:
+def _at_no_attitude(task: _Known) -> list[Excess]:
     """Return the limit that the platform exceeds at an end whatever attitude the planner chooses there."""
+    scenario, platform, carriers = task.scenario, task.platform, task.carriers
     if scenario.relative:
         return []
-    for end in (0, 1):
-        angles = [i for i in ATTITUDE if freedom[end][0, 0, i] == NEAR]
-        if angles and (freedom[end][0, 0, :3] == GIVEN).all():
-            usable = ~_dependent(scenario, freedom[end])[0]
+    for end, freedom in enumerate(task.freedom[:2]):
+        angles = [i for i in ATTITUDE if freedom[0, 0, i] == NEAR]
+        if angles and (freedom[0, 0, :3] == GIVEN).all():
+            usable = ~_dependent(scenario, freedom)[0]
             pose, places = platform.pose[end], carriers.pose[end]
             moves = np.abs([platform.velocity[end], platform.acceleration[end]]).max() > AT_REST
-            rests = not moves and (freedom[end][0, 1:] == GIVEN).all() and (freedom[end][1:, 0] == GIVEN).all()
-            if proven := no_attitude(scenario, float(times[end]), angles, pose, places, usable, bool(rests)):
+            rests = not moves and (freedom[0, 1:] == GIVEN).all() and (freedom[1:, 0] == GIVEN).all()
+            if proven := no_attitude(scenario, float(task.times[end]), angles, pose, places, usable, bool(rests)):
                 return proven
     return []
 
 
-def _stretched(
-    scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
-) -> list[Excess]:
+def _stretched(task: _Known) -> list[Excess]:
     """Return the worst cable that cannot keep the length that its drive fixes, wherever in its reach its carrier is."""
-    robot = scenario.robot
+    scenario, robot = task.scenario, task.scenario.robot
     if robot.fixed_lengths is None:
         return []
-    fixed, lengths = robot.fixed_lengths, scenario.dynamics.cable_lengths(platform.pose, carriers.pose)
-    nearest = _nearest_lengths(scenario, platform.pose, carriers.pose)
+    fixed, lengths = robot.fixed_lengths, scenario.dynamics.cable_lengths(task.platform.pose, task.carriers.pose)
+    nearest = _nearest_lengths(scenario, task.platform.pose, task.carriers.pose)
     off, given = np.empty_like(lengths), np.empty(lengths.shape, bool)
     for which, rows in enumerate((slice(0, 1), slice(1, 2), slice(2, None))):
-        free = freedom[which][:, 0].max(axis=1)
+        free = task.freedom[which][:, 0].max(axis=1)
         given[rows] = (free[1:] == GIVEN)[robot.carrier_of_cable]
         off[rows] = np.where(given[rows], np.abs(lengths[rows] - fixed), nearest[rows] - fixed)
-        off[rows] -= _reach(scenario, freedom[which]) if free[0] < FREE else np.inf
+        off[rows] -= task.reach(which) if free[0] < FREE else np.inf
     row, cable = np.unravel_index(off.argmax(), off.shape)
     if off[row, cable] <= LENGTH_TOLERANCE:
         return []
     length, why = lengths[row, cable], "the drive fixed-length keeps it constant"
     if not given[row, cable]:
         length, why = nearest[row, cable], f"{why}; here its carrier is as near as its reach permits"
-    about = f"cable {cable + 1}"
-    return [Excess("cable_length", about, float(times[row]), float(length), float(fixed[cable]), "m", "exactly", why)]
+    facts = (float(task.times[row]), float(length), float(fixed[cable]), "m", "exactly", why)
+    return [Excess("cable_length", f"cable {cable + 1}", *facts)]
 
 
 def _nearest_lengths(scenario: Scenario, platform: np.ndarray, carriers: np.ndarray) -> np.ndarray:
@@ -215,38 +220,28 @@ def _nearest_lengths(scenario: Scenario, platform: np.ndarray, carriers: np.ndar
     return nearest
 
 
-def _hurried(
-    scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
-) -> Iterator[Excess]:
+def _hurried(task: _Known) -> Iterator[Excess]:
     """Yield the limits of speeds and accelerations that are exceeded because the duration is too short."""
-    robot, order = scenario.robot, np.argsort(times)
-    which = np.minimum(np.arange(len(times)), 2)  # of `freedom`: start, end, between
-    poses = np.concatenate([platform.pose[None], carriers.pose.swapaxes(0, 1)])[:, order]
+    scenario, robot, order = task.scenario, task.scenario.robot, np.argsort(task.times)
+    which = task.which[order]
+    poses = np.concatenate([task.platform.pose[None], task.carriers.pose.swapaxes(0, 1)])[:, order]
     spread, centres = np.zeros((len(poses), 3)), np.zeros((2, 3))
-    for kind, its in enumerate(freedom):
+    for kind, its in enumerate(task.freedom):
         spread[:, kind] = np.where((its[:, 0] == FREE).any(axis=1), np.inf, 0.0)
         for k, point in enumerate((np.zeros(3), np.array(robot.platform.com))):
-            centres[k, kind] = spread[0, kind] + _reach(scenario, its, point[None])
-        spread[0, kind] += _reach(scenario, its)
+            centres[k, kind] = spread[0, kind] + task.reach(kind, point[None])
+        spread[0, kind] += task.reach(kind)
     if scenario.duration_range is not None:
         spread[0, 2], centres[:, 2] = np.inf, np.inf  # the planner may choose when the platform is where on its path
     if robot.fixed_lengths is not None:  # no carrier is farther from its attachments than its cables are long
         far = robot.fixed_lengths + np.linalg.norm(robot.anchors, axis=1) + LENGTH_TOLERANCE
-        attachments = scenario.dynamics.points(platform.pose, carriers.pose)[1][order]
+        attachments = scenario.dynamics.points(task.platform.pose, task.carriers.pose)[1][order]
         for index in np.flatnonzero(np.isinf(spread[1:]).any(axis=1)):
             own = np.flatnonzero(robot.carrier_of_cable == index)
             cable = own[far[own].argmin()]
             poses[1 + index, :, :3], spread[1 + index] = attachments[:, cable], spread[0] + far[cable]
-    resting = [np.all(_resting(freedom, platform, carriers, count), axis=0) for count in (3, 6)]
-    centres = centres[:, which[order]]
-    return too_fast(scenario, times[order], poses, spread[:, which[order]], *resting, centres=centres)
-
-
-def _resting(freedom: list[np.ndarray], platform: Motion, carriers: Motion, count: int = 6) -> np.ndarray:
-    """Return which of platform and carriers have no speed in the first coordinates at start and end, (2, 1 + c)."""
-    speeds = np.concatenate([platform.velocity[:2, None], carriers.velocity[:2]], axis=1)[:, :, :count]
-    given = np.stack([freedom[end][:, 1, :count] == GIVEN for end in (0, 1)])
-    return np.all(given & (np.abs(speeds) < AT_REST), axis=2)
+    resting = [np.all(task.resting(count), axis=0) for count in (3, 6)]
+    return too_fast(scenario, task.times[order], poses, spread[:, which], *resting, centres=centres[:, which])
 
 
 def _dependent(scenario: Scenario, freedom: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -281,31 +276,27 @@ def _excess(
     return float(beyond[row, which]) / limit.scale, excess
 
 
-def _beyond_reach(
-    scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
-) -> Certificate | None:
+def _beyond_reach(task: _Known) -> Certificate | None:
     """Return the certificate of the worst given pose at which carriers cannot hold the platform from their boxes."""
-    given = _given(freedom, len(times)) & ~scenario.phases.resting(times)
-    free = np.array([each[1:, 0].any(axis=1) for each in freedom])[_kinds(len(times))[given]]
-    moving, bases = (Motion(*(part[given] for part in motion)) for motion in (platform, carriers))
-    return out_of_reach(scenario, times[given], moving, bases, free)
+    given = task.given & ~task.scenario.phases.resting(task.times)
+    free = np.array([each[1:, 0].any(axis=1) for each in task.freedom])[task.which[given]]
+    return out_of_reach(task.scenario, task.times[given], task.platform.at(given), task.carriers.at(given), free)
 
 
-def _without_tensions(
-    scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
-) -> Certificate | None:
+def _without_tensions(task: _Known) -> Certificate | None:
     """Return the certificate of the worst end at which the task gives all poses and no feasible tensions exist.
 
     None if feasible tensions exist at both ends, or may exist.
     """
+    scenario, times, platform, carriers = task.scenario, task.times, task.platform, task.carriers
     worst: Certificate | None = None
-    for row in (0, 1):
-        if freedom[row][0].any() or freedom[row][1:, 0].any():
+    for row, freedom in enumerate(task.freedom[:2]):
+        if freedom[0].any() or freedom[1:, 0].any():
             continue
         one = slice(row, row + 1)
         A = scenario.dynamics.wrench_matrix(platform.pose[one], carriers.pose[one])
         distribute = distribution(scenario, times[one], A)
-        moving, bases = (Motion(*(part[one] for part in motion)) for motion in (platform, carriers))
+        moving, bases = platform.at(one), carriers.at(one)
         for wind, extreme in scenario.cases_at(platform.pose[row], platform.velocity[row]):
             result = distribute(scenario.required_wrench(times[one], moving, bases, wind, extreme), None)
             found = result.certificate
