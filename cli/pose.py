@@ -135,8 +135,10 @@ def _of_log(
 def _same(robot: Robot, one: PoseEstimate, other: PoseEstimate) -> bool:
     import numpy as np
 
-    turned = (one.pose[3:] - other.pose[3:] + np.pi) % (2 * np.pi) - np.pi
-    return bool(np.abs(one.pose[:3] - other.pose[:3]).max() < 0.01 * robot.length and np.abs(turned).max() < 0.01)
+    from ..models.points import shortest_way
+
+    off = np.abs(shortest_way(one.pose - other.pose))
+    return bool(off[:3].max() < 0.01 * robot.length and off[3:].max() < 0.01)
 
 
 def _included(estimate: PoseEstimate) -> str:

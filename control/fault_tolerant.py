@@ -11,6 +11,7 @@ from typing_extensions import override
 from ..base.inputs import InputError, required
 from ..base.text import quantity_row
 from ..models.files import AnyRobot, as_robot
+from ..models.points import shortest_way
 from ..models.robot import Robot
 from ..statics.formation import formation
 from .as_floats import as_floats
@@ -137,7 +138,7 @@ class FaultTolerant(Controller):
         now = np.vstack([state.pose, state.carrier_pose[rest.carriers]])
         rates = np.vstack([state.velocity, state.carrier_velocity[rest.carriers]])
         self._off = np.stack([now, rates]) - self._target(rest, reference)[:2]
-        self._off[0, :, 3:] = (self._off[0, :, 3:] + np.pi) % (2 * np.pi) - np.pi
+        self._off[0] = shortest_way(self._off[0])
 
     def _foresee(self, rest: Rest, time: float) -> None:
         """Announce references of the next seconds to the controller of the others, which takes 10 ms."""

@@ -31,6 +31,12 @@ def angles(R: np.ndarray) -> np.ndarray:
     return np.stack([roll, pitch, np.arctan2(across, along)], axis=-1)
 
 
+def shortest_way(off: np.ndarray) -> np.ndarray:
+    """Return differences of poses (..., 6) [m, rad] without whole turns: their angles are within half a turn."""
+    position, turned = off[..., :3], off[..., 3:]
+    return np.concatenate([position, turned - 2 * np.pi * np.round(turned / (2 * np.pi))], axis=-1)
+
+
 def axial(matrices: np.ndarray) -> np.ndarray:
     """Return the vectors (..., 3) of the skew-symmetric parts of matrices (..., 3, 3)."""
     skew = (matrices - matrices.swapaxes(-1, -2)) / 2

@@ -16,7 +16,6 @@ from .audits.audit import Audit
 from .audits.phase_summary import PhaseSummary, infeasible_spans, summaries
 from .audits.waypoint_distance import WaypointDistance, waypoint_distance
 from .tasks.deviation import Deviation
-from .tasks.paths import Motion
 from .tasks.scenario import Scenario
 from .tasks.task import MotionStatus
 from .warnings.positions import Instants, between_points, into_each_other, into_places, leaves_its_points, outside_frame
@@ -225,7 +224,7 @@ class PlanData(Displayed):
         """
         audit, scenario = self.audit, self.scenario
         rows = np.unique(np.linspace(0, len(audit.times) - 1, DRAWN_AT).round().astype(int))
-        motion, carriers = (Motion(*(part[rows] for part in each)) for each in (audit.motion, audit.carriers))
+        motion, carriers = audit.motion.at(rows), audit.carriers.at(rows)
         w = scenario.required_wrench(audit.times[rows], motion, carriers, scenario.wind)
         return share_of_robots(scenario.robot, motion.pose, w, carriers.pose, count, seed)
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..control.lag import Lag
+from ..models.points import shortest_way
 from ..models.trajectory import moved_on
 from .mismatch import LAGS, TENSIONS, Drawn
 
@@ -55,9 +56,9 @@ class Drives:
         if self._carriers is None:
             return
         tau, period = self._carriers, self._period
-        behind = np.zeros_like(starts[:, :, 0]) if self._poses is None else starts[:, :, 0] - self._poses
-        behind[..., 3:] = (behind[..., 3:] + np.pi) % (2 * np.pi) - np.pi
-        after = moved_on((starts[:, :, 0], starts[:, :, 1], starts[:, :, 2]), period)
+        at = starts[:, :, 0]
+        behind = np.zeros_like(at) if self._poses is None else shortest_way(at - self._poses)
+        after = moved_on((at, starts[:, :, 1], starts[:, :, 2]), period)
         steady = tau * (starts[:, :, 1] - tau * starts[:, :, 2])
         late = tau * (after[1] - tau * starts[:, :, 2]) + (behind - steady) * np.exp(-period / tau)
         for motion, e in ((starts, behind), (ends, late)):

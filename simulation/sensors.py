@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..control.noise import Noise
+from ..models.points import shortest_way
 
 DRAWN_AT_ONCE = 64  # periods whose noise is drawn together
 EARLY = 1e-6  # of a sample
@@ -73,8 +74,7 @@ class Sensors:
         platform += self._bias + drawn[:, :12] * self._of_motion
         platform[:, :6] = _rounded(platform[:, :6], self._steps)
         if noise.differenced and self._last is not None:
-            moved = platform[:, :6] - self._last.motions[:, 0, :6]
-            moved[:, 3:] -= 2 * np.pi * np.round(moved[:, 3:] / (2 * np.pi))
+            moved = shortest_way(platform[:, :6] - self._last.motions[:, 0, :6])
             platform[:, 6:] = moved / ((k - self._sampled) * self._period)
         tensions = np.maximum(true.tensions + self._tension_bias + drawn[:, 12:] * noise.tension, 0.0)
         return true._replace(motions=motions, tensions=_rounded(tensions, np.array(noise.tension_resolution)))

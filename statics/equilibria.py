@@ -117,7 +117,7 @@ def descend(robot: Robot, start: np.ndarray, carriers: np.ndarray, longest: np.n
             return None
         pose = robot.home.copy()
         pose[rows] = result["x"].full().ravel() * units[rows]
-        pose[3:] = np.arctan2(np.sin(pose[3:]), np.cos(pose[3:]))
+        pose = points.shortest_way(pose)
         # The constraint is on l^2, whose gradient is 2 l times that of l.
         tensions = np.maximum(result["lam_g"].full().ravel() * robot.weight * 2 * longest / size, 0.0)
         candidate = judge(robot, dynamics, pose, carriers, tensions)

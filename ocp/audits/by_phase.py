@@ -59,7 +59,7 @@ def worst_certificate(scenario: Scenario, time: float, platform: Motion, carrier
     A = scenario.dynamics.wrench_matrix(platform.pose, carriers)
     proofs: list[Certificate] = []
     for wind, extreme in scenario.cases_at(platform.pose, platform.velocity):
-        motion = Motion(*(part[None] for part in platform))
+        motion = platform.at(None)
         w = scenario.required_wrench(np.array([time]), motion, wind=wind, extreme=extreme)
         extended, limits, _ = _extended(scenario, phase, A[None], w, np.zeros((1, robot.m)))
         found = certify(wrench_problem(robot, extended[0], w[0], *limits))

@@ -9,6 +9,7 @@ and by differences, and shares nothing with the program.
 import numpy as np
 
 from ...models.part import COORDINATES
+from ...models.points import shortest_way
 from ..limits.distance import Distance
 from ..tasks.ends import at_rest_without_acceleration, carrier_ends, platform_ends
 from ..tasks.paths import Motion
@@ -119,13 +120,13 @@ def _initial(audited: Instants) -> list[Excess]:
     task, exceeded = audited.scenario.task, list[Excess]()
     bodies: list[tuple[int | None, str, Motion]] = [(None, "platform", audited.motion)]
     for i, carrier in enumerate(audited.scenario.robot.carriers):
-        bodies.append((i, carrier.name, Motion(*(part[:, i] for part in audited.carriers))))
+        bodies.append((i, carrier.name, audited.carriers.at(np.s_[:, i])))
     for end, name, state in ((0, "initial", task.initial), (-1, "final", task.final)):
         for owner, about, motion in bodies if state is not None else []:
             for order, value in state.of(owner) if state is not None else ():
                 off = motion[order][end] - np.array(value)
                 if order == 0:
-                    off[3:] = np.arctan2(np.sin(off[3:]), np.cos(off[3:]))
+                    off = shortest_way(off)
                 unit = ("m, rad", "m/s, rad/s", "m/s^2, rad/s^2")[order]
                 what = f"distance from the {'given end' if end else 'measured start'}"
                 exceeded += _missed(name, about, audited.times[end], np.abs(off).max(), END_TOLERANCE, unit, what)
@@ -156,9 +157,8 @@ def _tube_ends(audited: Instants) -> list[Excess]:
     scenario, exceeded = audited.scenario, []
     word = platform_ends(scenario.task)
     if word == "periodic":
-        off = [part[-1] - part[0] for part in audited.motion]
-        off[0][3:] -= 2 * np.pi * np.round(off[0][3:] / (2 * np.pi))
-        worst = np.max(np.abs(off))
+        off, *rates = (part[-1] - part[0] for part in audited.motion)
+        worst = np.max(np.abs([shortest_way(off), *rates]))
         facts = (worst, END_TOLERANCE, "m, m/s, m/s^2", "difference from the start")
         return _missed("tube.ends", "platform", scenario.duration, *facts)
     if word not in ("rest", "exact"):
@@ -202,8 +202,7 @@ def _waypoints(audited: Instants) -> list[Excess]:
     if audited.deviation is None:
         return []  # on its path, whatever the time law; `lay_out` accepts no path that misses its points then
     times, offsets = audited.scenario.passes()
-    missed = _off_path(audited, times) - offsets
-    missed[:, 3:] -= 2 * np.pi * np.round(missed[:, 3:] / (2 * np.pi))
+    missed = shortest_way(_off_path(audited, times) - offsets)
     off, turned = np.linalg.norm(missed[:, :3], axis=1), np.linalg.norm(missed[:, 3:], axis=1)
     exceeded = []
     for k, time in enumerate(times):
@@ -306,7 +305,7 @@ def _jumps(audited: Instants) -> list[Excess]:
             steady = shift * (before[body][k + 1] + after[body][k + 1])
             jump = after[body][k] - before[body][k] - steady
             if k == 0:
-                jump[..., 3:] = np.arctan2(np.sin(jump[..., 3:]), np.cos(jump[..., 3:]))
+                jump = shortest_way(jump)
             jump = np.abs(jump).reshape(len(inner), -1).max(axis=1)
             row = int(jump.argmax())
             what = ("jump of the position", "jump of the velocity")[k]

@@ -69,7 +69,7 @@ def _values(audited: Instants, limit: Distance, moved: np.ndarray) -> np.ndarray
     way, enough = np.insert(np.cumsum(changes), 0, 0.0), limit.low + changes.max(initial=0.0)
     values, known, more = np.empty((n, len(limit.labels))), np.zeros(n, bool), np.r_[0 : n - 1 : PARTS**3, n - 1]
     while more.size:
-        platform, carriers = (Motion(*(part[more] for part in its)) for its in (audited.motion, audited.carriers))
+        platform, carriers = audited.motion.at(more), audited.carriers.at(more)
         values[more], known[more] = scenario.limits.distances(limit, platform, carriers), True
         at = np.flatnonzero(known)
         first, last = at[:-1], at[1:]

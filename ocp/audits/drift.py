@@ -12,6 +12,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from ...models.points import shortest_way
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 
@@ -93,8 +94,7 @@ def _run(
 
 def _differences(poses: np.ndarray, planned: np.ndarray) -> tuple[float, float]:
     """Return largest distance [m] and difference of an Euler angle [rad] of poses (n, 6); infinite if they diverge."""
-    off = poses - planned
-    off[:, 3:] = np.arctan2(np.sin(off[:, 3:]), np.cos(off[:, 3:]))
+    off = shortest_way(poses - planned)
     if not np.isfinite(off).all():
         return np.inf, np.inf
     return float(np.linalg.norm(off[:, :3], axis=1).max()), float(np.abs(off[:, 3:]).max())

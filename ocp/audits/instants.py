@@ -62,7 +62,7 @@ class Instants(Displayed):
     def of(self, rows: np.ndarray) -> Instants:
         """Return some of them."""
         parts = {name: getattr(self, name)[rows] for name in OF_INSTANTS}
-        motions = {name: Motion(*(part[rows] for part in getattr(self, name))) for name in MOTIONS}
+        motions = {name: getattr(self, name).at(rows) for name in MOTIONS}
         return replace(self, **parts, **motions, values=[each[rows] for each in self.values])
 
 
@@ -93,7 +93,7 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
         if chosen is not result.tensions:
             changed = (chosen != result.tensions).any(axis=1)
             result = result._replace(tensions=chosen)
-            moved, bases = (Motion(*(part[changed] for part in each)) for each in (motion, carriers))
+            moved, bases = motion.at(changed), carriers.at(changed)
             again = scenario.limits.along(moved, bases, chosen[changed], off_path[changed], distances=False)
             for its, other in zip(bounded, again, strict=True):
                 its[changed] = other
@@ -135,7 +135,7 @@ def limited(
 ) -> list[np.ndarray]:
     """Return the values of some `rows` of `Instants`, distances included, of some `limits`; default: of all."""
     times = times[rows]
-    motion, carriers = (Motion(*(part[rows] for part in each)) for each in (motion, carriers))
+    motion, carriers = motion.at(rows), carriers.at(rows)
     return [
         np.where(scenario.in_force(limit, times)[:, None], scenario.limits.distances(limit, motion, carriers), np.nan)
         if isinstance(limit, Distance)

@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...solvers import Certificate
-from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 from .audit import Audit
 from .by_phase import worst_certificate
@@ -54,7 +53,7 @@ def infeasible_spans(scenario: Scenario, audit: Audit) -> tuple[Certificate, ...
     certificates = []
     for first, after in sorted(edges):
         row = first + int(audit.violation[first:after].argmax())
-        time, platform = float(audit.times[row]), Motion(*(part[row] for part in audit.motion))
+        time, platform = float(audit.times[row]), audit.motion.at(row)
         certificate = worst_certificate(scenario, time, platform, audit.carriers.pose[row])
         if certificate is not None:
             span = (float(audit.times[first]), float(audit.times[after - 1]))

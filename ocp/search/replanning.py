@@ -8,6 +8,7 @@ import numpy as np
 
 from ...base.inputs import InputError, number
 from ...models import Robot
+from ...models.points import shortest_way
 from ..nlp.rows import Mesh
 from ..nlp.solver import Progress, Solver
 from ..plan import Plan
@@ -17,7 +18,7 @@ from ..tasks.initial import Final, Initial, check_ends
 from ..tasks.lay_out import carrier_paths, initial_of
 from ..tasks.paths import AnyPath, Motion, RestPath, ReturnPath
 from ..tasks.paths.sequence import decay
-from ..tasks.scenario import ATTITUDE, Scenario
+from ..tasks.scenario import Scenario
 from ..tasks.task import FreeBase, GivenBase
 from .search import Search
 
@@ -189,7 +190,7 @@ def _offset(whole: Scenario, last: Plan, at: np.ndarray, time: float, state: Ini
             pose, velocity, tensions, np.array(state.carrier_pose), None if whole.wind is None else np.array(whole.wind)
         )
     off = np.stack([pose, velocity, acceleration]) - np.stack(reference)
-    off[0, ATTITUDE] -= 2 * np.pi * np.round(off[0, ATTITUDE] / (2 * np.pi))
+    off[0] = shortest_way(off[0])
     return off * robot.dof_mask
 
 
@@ -219,7 +220,7 @@ def _guess(scenario: Scenario, last: Plan, at: np.ndarray, carriers: Motion, set
     if initial is None or initial.carrier_pose is None or initial.carrier_velocity is None:
         return replace(guess, nodes=nodes)
     away = np.array([initial.carrier_pose, initial.carrier_velocity]) - [carriers.pose[0], carriers.velocity[0]]
-    away[0, :, 3:] -= 2 * np.pi * np.round(away[0, :, 3:] / (2 * np.pi))
+    away[0] = shortest_way(away[0])
     off = scenario.free_of(np.zeros((3, 6)), np.concatenate([away, np.zeros_like(away[:1])]))
     q, v, a = (mine + more for mine, more in zip((guess.q, guess.v, guess.a), decay(nodes, settle, off), strict=True))
     return replace(guess, nodes=nodes, q=q, v=v, a=a)

@@ -262,9 +262,7 @@ class Scenario(Displayed):
 
     def off_path(self, times: np.ndarray, motion: Motion, carriers: Motion) -> np.ndarray:
         """Return the offset of the platform at `motion` in {G} from its path, (n, 6) [m, rad], in the path's axes."""
-        off = self.pose_on_path(motion, carriers) - self.path.at(times, self.duration).pose
-        off[:, 3:] -= 2 * np.pi * np.round(off[:, 3:] / (2 * np.pi))
-        return off
+        return points.shortest_way(self.pose_on_path(motion, carriers) - self.path.at(times, self.duration).pose)
 
     def passes(self) -> tuple[np.ndarray, np.ndarray]:
         """Return when the platform has to pass inner points of its path [s], and their offsets from it.
@@ -275,9 +273,7 @@ class Scenario(Displayed):
             return np.zeros(0), np.zeros((0, 6))
         _, times, poses = self.path.stations(self.duration)
         times, poses = times[1:-1].clip(0.0, self.duration), poses[1:-1]
-        missed = poses - self.path.at(times, self.duration).pose
-        missed[:, 3:] -= 2 * np.pi * np.round(missed[:, 3:] / (2 * np.pi))
-        return times, missed
+        return times, points.shortest_way(poses - self.path.at(times, self.duration).pose)
 
     def spread(self, body: int | None) -> np.ndarray:
         """Return the matrix (6, count) from free coordinates to the six of the platform (None) or of a carrier."""

@@ -8,6 +8,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...models import Robot
 from ...models.part import COORDINATES, PositiveRange
+from ...models.points import shortest_way
 from ...models.shapes import Shape
 from ..limits.clearance import point_outside
 from ..limits.limits import Limits
@@ -192,8 +193,7 @@ def _check_cycle(task: Task, where: str) -> None:
         raise InputError(f"{where}: path.frame must be world with tube.ends periodic, got {task.path.frame!r}")
     ends = task.path.at(np.array([0.0, task.seconds]), task.seconds)
     pose, *rates = (part[1] - part[0] for part in ends)
-    pose[3:] -= 2 * np.pi * np.round(pose[3:] / (2 * np.pi))
-    for off, what in zip((pose, *rates), ("pose", "velocity", "acceleration"), strict=True):
+    for off, what in zip((shortest_way(pose), *rates), ("pose", "velocity", "acceleration"), strict=True):
         if (worst := float(np.abs(off).max())) > TOLERANCE:
             must = f"must end with the {what} with which it starts, since tube.ends is periodic"
             raise InputError(f"{where}: path {must}, got a difference of {worst:.3g}")

@@ -11,6 +11,7 @@ from typing_extensions import override
 from ...base.errors import InputError
 from ...base.text import quantity
 from ...control.trajectory import read_trajectory
+from ...models.points import shortest_way
 from ...models.robot import Robot
 from ...models.trajectory import Trajectory
 from ...statics.stops import stop_along
@@ -82,7 +83,7 @@ class Follow(Event):
         if carried is not None and not new.loads:
             notes.append(f"another plan, without the load of {quantity(carried.mass, 'kg')} that the platform carries")
         jumps = _motions(new, 0.0) - _motions(trajectory, time)  # (2, 1 + c, 6)
-        jumps[0, :, 3:] = (jumps[0, :, 3:] + np.pi) % (2 * np.pi) - np.pi
+        jumps[0] = shortest_way(jumps[0])
         flies = [bool(carrier.actuators) for carrier in robot.carriers]
         jumps[:, 1:, 3:][:, flies] = 0.0  # their attitudes follow from their accelerations
         most = np.abs(jumps).max(axis=(0, 2))

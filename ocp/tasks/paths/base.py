@@ -32,6 +32,10 @@ class Motion(NamedTuple):
         """Return poses (n, 6) at rest."""
         return cls(pose, np.zeros_like(pose), np.zeros_like(pose))
 
+    def at(self, rows: Any) -> Motion:
+        """Return the motion at some of its times, by an index of NumPy."""
+        return Motion(*(part[rows] for part in self))
+
     def plus(self, deviation: Iterable[np.ndarray]) -> Motion:
         """Add a deviation of pose, velocity and acceleration, coordinate by coordinate."""
         return Motion(*(mine + its for mine, its in zip(self, deviation, strict=True)))

@@ -11,6 +11,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from typing_extensions import override
 
 from ....models.part import Finite, NonNegative, Vector3, optional
+from ....models.points import shortest_way
 from .base import (
     FILE_ORIGIN,
     Motion,
@@ -276,9 +277,7 @@ class WaypointPath(PathBase):
 
     def missed(self, duration: float) -> np.ndarray:
         """Return the distances of the points from the path at its knots, (n, 6) [m, rad]."""
-        missed = np.array(self.points) - self.at(self.knots(duration), duration).pose
-        missed[:, 3:] -= 2 * np.pi * np.round(missed[:, 3:] / (2 * np.pi))
-        return missed
+        return shortest_way(np.array(self.points) - self.at(self.knots(duration), duration).pose)
 
     def outside(self) -> np.ndarray:
         """Return the distance by which the path leaves the box of its points along x, y and z, (3,) [m]."""
@@ -307,9 +306,7 @@ def shortest_order(points: np.ndarray) -> list[int]:
     1 rad is taken as 1 m, and angles turn the shortest way. Source: M. Held, R. M. Karp, "A dynamic programming
     approach to sequencing problems", 1962.
     """
-    apart = points[:, None] - points
-    apart[..., 3:] -= 2 * np.pi * np.round(apart[..., 3:] / (2 * np.pi))
-    distance = np.linalg.norm(apart, axis=2).tolist()
+    distance = np.linalg.norm(shortest_way(points[:, None] - points), axis=2).tolist()
     last, inner = len(points) - 1, range(1, len(points) - 1)
     # By the points that are visited, as a set, and the last one of them: the shortest path so far, and the one before.
     best = {(frozenset([k]), k): (distance[0][k], 0) for k in inner}
