@@ -1,5 +1,6 @@
 """A robot as the plain record that the numeric core reads: `record_of`, and the layout of core/robot.h."""
 
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any
 
@@ -58,9 +59,7 @@ RECORD = np.dtype(
 
 def fits(robot: Robot) -> bool:
     """Return whether the core has room for all cables, carriers and actuators of a robot."""
-    return all(count <= most for _, most, count in _counts(robot)) and all(
-        len(carrier.actuators) <= MOST_ACTUATORS for carrier in robot.carriers
-    )
+    return not any(_misfits(robot))
 
 
 @lru_cache(maxsize=16)
@@ -70,9 +69,8 @@ def record_of(robot: Robot) -> np.ndarray:
     Stiffness and damping are from the file, 0 where it has none. Raises `InputError` if the robot has more
     cables, carriers or actuators than the core has room for.
     """
-    for name, most, count in _counts(robot):
-        if count > most:
-            raise InputError(f"robot {robot.name!r} must have at most {most} {name}, got {count}")
+    for misfit in _misfits(robot):
+        raise InputError(misfit)
     record = np.zeros((), RECORD)
     record["carriers"], record["cables"], record["mass"] = len(robot.carriers), robot.m, robot.platform.mass
     record["com"], record["gravity"], record["freedom"] = robot.platform.com, robot.gravity, robot.dof_mask
@@ -90,8 +88,14 @@ def record_of(robot: Robot) -> np.ndarray:
     return record
 
 
-def _counts(robot: Robot) -> tuple[tuple[str, int, int], ...]:
-    return ("cables", MOST_CABLES, robot.m), ("carriers", MOST_CARRIERS, len(robot.carriers))
+def _misfits(robot: Robot) -> Iterator[str]:
+    """Yield a message for each thing of which the robot has more than the core has room for."""
+    whose = f"robot {robot.name!r}"
+    counts = [(whose, "cables", MOST_CABLES, robot.m), (whose, "carriers", MOST_CARRIERS, len(robot.carriers))]
+    counts += [(f"carrier {each.name}", "actuators", MOST_ACTUATORS, len(each.actuators)) for each in robot.carriers]
+    for owner, name, most, count in counts:
+        if count > most:
+            yield f"{owner} must have at most {most} {name}, got {count}"
 
 
 def _write_platform(body: np.ndarray, robot: Robot) -> None:
@@ -114,9 +118,6 @@ def _write_mass(body: Any, mass: float, moves: np.ndarray, inertia: np.ndarray, 
 def _write_carrier(body: Any, carrier: Carrier, robot: Robot) -> None:
     limits = carrier.motion_limits
     if carrier.body is not None:
-        if len(carrier.actuators) > MOST_ACTUATORS:
-            count = len(carrier.actuators)
-            raise InputError(f"carrier {carrier.name} must have at most {MOST_ACTUATORS} actuators, got {count}")
         inertia = inertia_matrix(carrier.body.inertia)
         _write_mass(body, carrier.body.mass, np.ones(3), inertia, np.linalg.inv(inertia))
         body["actuators"] = len(carrier.actuators)

@@ -14,10 +14,7 @@ from .arrays import Matrix
 
 def rotation(angles: Matrix) -> Matrix:
     """Return R = Rz(yaw) Ry(pitch) Rx(roll), (3, 3), of angles (roll, pitch, yaw), (3, 1) [rad]."""
-    roll, pitch, yaw = ca.vertsplit(angles)
-    sr, cr = ca.sin(roll), ca.cos(roll)
-    sp, cp = ca.sin(pitch), ca.cos(pitch)
-    sy, cy = ca.sin(yaw), ca.cos(yaw)
+    (sr, sp, sy), (cr, cp, cy) = ca.vertsplit(ca.sin(angles)), ca.vertsplit(ca.cos(angles))
     return ca.vertcat(
         ca.horzcat(cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
         ca.horzcat(sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
@@ -27,18 +24,14 @@ def rotation(angles: Matrix) -> Matrix:
 
 def rate_matrix(angles: Matrix) -> Matrix:
     """Return P, (3, 3): body rate Omega = P dTheta. Singular at pitch = +-90 degrees."""
-    roll, pitch, _ = ca.vertsplit(angles)
-    sr, cr = ca.sin(roll), ca.cos(roll)
-    sp, cp = ca.sin(pitch), ca.cos(pitch)
+    (sr, sp), (cr, cp) = ca.vertsplit(ca.sin(angles[:2])), ca.vertsplit(ca.cos(angles[:2]))
     return ca.vertcat(ca.horzcat(1, 0, -sp), ca.horzcat(0, cr, sr * cp), ca.horzcat(0, -sr, cr * cp))
 
 
 def rate_matrix_derivative(angles: Matrix, rates: Matrix) -> Matrix:
     """Return the time derivative of P, (3, 3), at the Euler rates dTheta in [rad/s]."""
-    roll, pitch, _ = ca.vertsplit(angles)
     d_roll, d_pitch, _ = ca.vertsplit(rates)
-    sr, cr = ca.sin(roll), ca.cos(roll)
-    sp, cp = ca.sin(pitch), ca.cos(pitch)
+    (sr, sp), (cr, cp) = ca.vertsplit(ca.sin(angles[:2])), ca.vertsplit(ca.cos(angles[:2]))
     return ca.vertcat(
         ca.horzcat(0, 0, -cp * d_pitch),
         ca.horzcat(0, -sr * d_roll, cr * cp * d_roll - sr * sp * d_pitch),
@@ -60,9 +53,8 @@ def turning(pose: Matrix, velocity: Matrix, acceleration: Matrix) -> tuple[Matri
 
 def inverse_rate_matrix(angles: Matrix) -> Matrix:
     """Return P^-1, (3, 3): dTheta = P^-1 Omega. Infinite at pitch = +-90 degrees."""
-    roll, pitch, _ = ca.vertsplit(angles)
-    sr, cr = ca.sin(roll), ca.cos(roll)
-    tp, cp = ca.tan(pitch), ca.cos(pitch)
+    (sr, sp), (cr, cp) = ca.vertsplit(ca.sin(angles[:2])), ca.vertsplit(ca.cos(angles[:2]))
+    tp = sp / cp
     return ca.vertcat(ca.horzcat(1, sr * tp, cr * tp), ca.horzcat(0, cr, -sr), ca.horzcat(0, sr / cp, cr / cp))
 
 
