@@ -1,10 +1,11 @@
 """`AtRest`: by how much a robot at rest keeps its task's limits, for many poses in one call."""
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from ...models.batch import in_blocks
 from ...solvers import solve_batch
 from ..audits.tensions import few_and_inverse, scaled
 from ..limits import Limit, Rate
@@ -49,18 +50,6 @@ class AtRest:
             unit = 1.0 / known if limit.unit == "m" else self.size / limit.scale
             checked.append((k, limit, place, unit))
         return checked
-
-    @cached_property
-    def _evaluated(self) -> tuple[Any, Any, list[np.ndarray], np.ndarray]:
-        """Return the function of all limits with its arguments and values in place: no copies, no conversions."""
-        robot, function = self.scenario.robot, self.scenario.limits.function
-        arguments = [*(np.zeros(18) for _ in range(1 + len(robot.carriers))), np.zeros(robot.m), np.zeros(6)]
-        values = np.zeros(function.numel_out(0))
-        buffer, evaluate = function.buffer()
-        for i, argument in enumerate(arguments):
-            buffer.set_arg(i, argument.data)  # pyrefly: ignore[missing-argument]
-        buffer.set_res(0, values.data)  # pyrefly: ignore[missing-argument]
-        return buffer, evaluate, arguments, values
 
     def __call__(self, platform: np.ndarray, carriers: np.ndarray, off_path: np.ndarray | None = None) -> Kept:
         """Return by how much limits are kept by platform (n, 6) and carriers (n, c, 6)."""
@@ -136,17 +125,9 @@ class AtRest:
         n, checked = len(platform), self._checked
         if not checked:
             return np.full(n, np.inf), np.zeros(n, int)
-        _, evaluate, arguments, values = self._evaluated
-        table = np.empty((n, len(values)))
-        for row in range(n):
-            arguments[0][:6] = platform[row]
-            for argument, pose in zip(arguments[1:], carriers[row], strict=False):
-                argument[:6] = pose
-            arguments[-2][:] = tensions[row]
-            if off_path is not None:
-                arguments[-1][:] = off_path[row]
-            evaluate()
-            table[row] = values
+        bodies = [np.hstack([pose, np.zeros((n, 12))]) for pose in (platform, *carriers.swapaxes(0, 1))]
+        off_path = np.zeros((n, 6)) if off_path is None else off_path
+        (table,) = in_blocks(self.scenario.limits.function, [*bodies, tensions, off_path], 1)
         at = np.zeros(n)
         for _, limit, place, _ in checked:
             if type(limit).over is not Limit.over:
