@@ -107,8 +107,9 @@ class Part(Displayed, BaseModel):
         """Return whether the other is of the same class with equal fields, whatever either has computed from them."""
         if type(self) is not type(other):
             return NotImplemented
-        mine, its = vars(self), vars(other)
-        return all(mine[name] == its[name] for name in type(self).__pydantic_fields__)
+        # As lists, whose comparison takes no step of Python for numbers and shared parts.
+        mine, its = ([vars(one)[name] for name in type(self).__pydantic_fields__] for one in (self, other))
+        return mine == its
 
 
 class Box(Part):

@@ -120,7 +120,8 @@ def test_unknown_poses_take_few_steps(seed):
 def test_second_derivatives_of_lengths_by_poses():
     built = as_built(20, 0)
     model = model_of(load("cogiro"), Measurements(built.readings), ("anchors",), {})
-    state, h = model.begin(), 1e-6
+    begin, h = model.begin(), 1e-6
+    state = model.moved(begin, 0 * begin.x, np.tile([0.1, 0, 0, 0.3, -0.4, 0.5], (20, 1)))
 
     def gradient(at):
         residuals, derivatives = model.linearised(at)

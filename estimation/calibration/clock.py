@@ -1,5 +1,6 @@
 """An initial value of the clock offset: repeating motions cause local minima, so many values are tried."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
 
@@ -19,7 +20,10 @@ from .parameters import IN_BALANCE
 CLOCK_RANGE = 1.0  # [s] to each side
 SHARE = 0.25  # of the record, to which the range is limited
 MOST_SAMPLES = 400
+FEWER = 100  # samples that leave out most of the offsets
 TRIED = 81
+LIKELY = 9  # offsets that are tried again with all samples
+HALVINGS = 3  # of the step between offsets
 FEWEST = 0.4  # of the samples that must have a pose
 WINDING = 10.0  # standard deviations of readings that change, and so show a clock offset
 SMOOTH = 0.1  # error of a pose between others, as a share of how far poses are apart
@@ -32,11 +36,11 @@ def begin_with_clock(model: Model, length: float) -> State:
     `length` is the length of the cables [m].
     """
     count = len(model.measurements)
-    few = model.only(np.unique(np.linspace(0, count - 1, min(count, MOST_SAMPLES)).astype(int)))
     # Where poses are measured, forces tell less of the clock than lengths do.
     left_out = ("clock",) if needs_balance(model.robot, model.measurements) else ("clock", *IN_BALANCE)
-    fixed = tuple(group for group in few.parameters.groups if group not in left_out)
-    without = replace(few, parameters=replace(few.parameters, groups=fixed))
+    fixed = tuple(group for group in model.parameters.groups if group not in left_out)
+    few = model.only(np.unique(np.linspace(0, count - 1, min(count, MOST_SAMPLES)).astype(int)))
+    few = replace(few, parameters=replace(few.parameters, groups=fixed))
     times = model.measurements.times
     assert times is not None
     most = min(CLOCK_RANGE, SHARE * float(times[-1] - times[0]))
@@ -44,11 +48,16 @@ def begin_with_clock(model: Model, length: float) -> State:
     far = _by_cable_speeds(model)
     if abs(far) > most:
         tried = np.concatenate([tried, far + tried])
-    costs = [_cost_at(without, clock, length) for clock in tried]
-    best = tried[int(np.argmin(costs))]
-    finer = best + np.linspace(-1, 1, 17) * (tried[1] - tried[0])
+    step = tried[1] - tried[0]
+    fewer = few.only(slice(None, None, max(len(few.measurements) // FEWER, 1)))
+    tried = tried[np.argsort(_costs(fewer, tried, length), kind="stable")[:LIKELY]]
+    cost, best = min(zip(_costs(few, tried, length), tried, strict=True))
+    for _ in range(HALVINGS):
+        step /= 2
+        beside = best - step, best + step
+        cost, best = min((cost, best), *zip(_costs(few, beside, length), beside, strict=True))
     state = model.begin()
-    state.x[model.parameters.clock] = finer[int(np.argmin([_cost_at(without, clock, length) for clock in finer]))]
+    state.x[model.parameters.clock] = best
     return state
 
 
@@ -103,14 +112,18 @@ def _by_cable_speeds(model: Model) -> float:
     return coarse(given.times, readings, given.times[known], lengths[known])[0]
 
 
-def _cost_at(model: Model, clock: float, length: float) -> float:
-    """Return the mean square of the readings' residuals after one step of the parameters; inf with too few poses."""
-    state = model.begin()
-    state.x[model.parameters.clock] = clock
-    inside = int(model.inside(state).sum())
-    if inside < FEWEST * len(model.measurements):
-        return np.inf
-    equations = NormalEquations.at(model, state, metric(model))
-    of_poses = 0.0 if equations.y is None else float(np.vdot(equations.y, equations.y))
-    gained = float(equations.b @ np.linalg.solve(held(equations.S, length), equations.b))
-    return (equations.cost - of_poses - gained) / max(inside, 1)
+def _costs(model: Model, clocks: Iterable[float], length: float) -> list[float]:
+    """Return the mean square of the readings' residuals after one step of the parameters, inf with too few poses."""
+    scale, costs = metric(model), []
+    for clock in clocks:
+        state = model.begin()
+        state.x[model.parameters.clock] = clock
+        inside = int(model.inside(state).sum())
+        if inside < FEWEST * len(model.measurements):
+            costs.append(np.inf)
+            continue
+        equations = NormalEquations.at(model, state, scale)
+        of_poses = 0.0 if equations.y is None else float(np.vdot(equations.y, equations.y))
+        gained = float(equations.b @ np.linalg.solve(held(equations.S, length), equations.b))
+        costs.append((equations.cost - of_poses - gained) / max(inside, 1))
+    return costs

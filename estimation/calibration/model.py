@@ -263,7 +263,7 @@ class Model(Displayed):
         table, m = parameters.table(state.x), robot.m
         base = _, _, velocity, _ = self._base(state.x)
         position, rotation = base[0] + state.shift, state.turn @ base[1]
-        arms = np.matmul(table[:, None, None, 3:6], np.swapaxes(rotation, 1, 2))[:, :, 0]  # (m, N, 3), R b
+        arms = np.einsum("nij,mj->mni", rotation, table[:, 3:6])  # R b
         moving = None if self.carriers is None else self.carriers.at(state.x[parameters.clock])
         at = carriers_of(robot, self.measurements) if moving is None else moving.poses
         run = runs(robot, table, position, rotation, at)
