@@ -20,7 +20,7 @@ def is_underactuated(robot: Robot) -> bool:
     count = len(robot.platform.dof)
     if robot.m < count or robot.fixed_lengths is None:
         return robot.m < count
-    scale = np.repeat([1.0, 1 / robot.length], 3) * robot.dof_mask
+    scale = robot.wrench_scale * robot.dof_mask
     sizes = np.linalg.svd(scale[:, None] * dynamics_of(robot).wrench_matrix(robot.home, robot.carrier_home))[1]
     return bool(sizes[count - 1] <= WEAK * sizes[0])
 
@@ -34,7 +34,7 @@ def uncontrolled(robot: Robot, reach: np.ndarray) -> np.ndarray:
     """
     dynamics, home = dynamics_of(robot), robot.carrier_home
     found = tensions(robot, robot.home, method="soft-wrench").tensions
-    scale = np.repeat([1.0, 1 / robot.length], 3) * robot.dof_mask
+    scale = robot.wrench_scale * robot.dof_mask
     A = dynamics.wrench_matrix(robot.home, home)
     columns = [A * robot.force_scale]
     for index, far in enumerate(reach):

@@ -95,7 +95,7 @@ def accelerations(robot: Robot) -> np.ndarray:
 def _at_home(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """Return wrench matrix (6, m) and wrenches of unit accelerations (6, 6), with moments divided by the length."""
     dynamics, rest = dynamics_of(robot), np.zeros(6)
-    scale = (np.repeat([1.0, 1 / robot.length], 3) * robot.dof_mask)[:, None]
+    scale = (robot.wrench_scale * robot.dof_mask)[:, None]
     still = dynamics.required_wrench(robot.home, rest, rest)
     M = np.stack([dynamics.required_wrench(robot.home, rest, unit) - still for unit in np.eye(6)], axis=1)
     return scale * dynamics.wrench_matrix(robot.home, robot.carrier_home), scale * M

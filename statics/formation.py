@@ -91,12 +91,9 @@ def _solved(robot: Robot, pose: np.ndarray, carriers: np.ndarray, lengths: np.nd
         return None
     tilted, places, tensions, lacking = np.split(np.asarray(found["x"]).ravel(), np.cumsum([2, 5 * c, m]))
     placed_at = np.column_stack([places.reshape(c, 5), carriers[:, 5]])
-    return Formation(np.hstack([pose[:3], tilted, pose[5]]), placed_at, tensions, lacking / _scale(robot))
-
-
-def _scale(robot: Robot) -> np.ndarray:
-    """Return the factors from a wrench to parts of the characteristic force, (6,) [1/N, 1/(N m)]."""
-    return np.repeat([1.0, 1 / robot.length], 3) / robot.force_scale
+    return Formation(
+        np.hstack([pose[:3], tilted, pose[5]]), placed_at, tensions, lacking * robot.force_scale / robot.wrench_scale
+    )
 
 
 def _at_rest(robot: Robot, pose: ca.SX, run: Exit, tensions: ca.SX, missing: ca.SX, lengths: np.ndarray) -> list[_Row]:
@@ -104,7 +101,7 @@ def _at_rest(robot: Robot, pose: ca.SX, run: Exit, tensions: ca.SX, missing: ca.
     A = kinematics.wrench_matrix(robot, pose, run.directions)
     weight = np.append(robot.platform.mass * np.array(robot.gravity), np.zeros(3))
     return [
-        _Row(_scale(robot) * (A @ tensions + weight) + missing),
+        _Row(robot.wrench_scale / robot.force_scale * (A @ tensions + weight) + missing),
         _Row((ca.vec(run.lengths) - lengths) / robot.length),
     ]
 

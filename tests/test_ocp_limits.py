@@ -11,6 +11,7 @@ from towline.control import stop
 from towline.models import Dynamics, Robot, load
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.ocp import plan, read_task, time_along
+from towline.ocp.limits.cables import CableSpeed
 from towline.ocp.limits.clearance import between_cables, cable_outside, point_outside
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task
@@ -256,3 +257,10 @@ def test_a_saved_task_keeps_distances_that_are_null():
     place = {"kind": "sphere", "centre": [1, 1, 1], "radius": 0.1, "cables": None, "platform": None}
     task = read_task({"path": {"kind": "rest", "pose": [0, 0, 1]}, "duration": 1, "limits": {"keep_out": [place]}})
     assert parse_yaml(to_yaml(task), Task, "task") == task
+
+
+def test_a_limit_of_some_cables_names_these():
+    bounds = [2.0, None, 1.0, None, 1.0, None, None, 2.0]
+    limits = list(CableSpeed.each(load("cogiro"), bounds))
+    assert [limit.high for limit in limits] == [2.0, 1.0]
+    assert [limit.labels for limit in limits] == [("cable 1", "cable 8"), ("cable 3", "cable 5")]

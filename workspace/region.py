@@ -113,7 +113,7 @@ def nearest_feasible(
     - `size`: search radius [m].
     """
     rng, free = np.random.default_rng(0), robot.dof_mask.astype(bool)
-    unit = np.where(np.arange(6) < 3, 1.0, 1.0 / robot.length) * free
+    unit = robot.wrench_scale * free
 
     def holding(poses: np.ndarray) -> np.ndarray:
         """Return the poses at which the condition holds, the closest first."""

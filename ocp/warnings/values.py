@@ -276,7 +276,7 @@ def weak_formation(seen: Instants, formation: float | None = None) -> list[str]:
     """
     robot = seen.robot
     rows = np.flatnonzero(robot.dof_mask)
-    scale = np.repeat([1.0, 1.0 / robot.length], 3)[rows, None]
+    scale = robot.wrench_scale[rows, None]
     at_home = np.linalg.svd(scale * seen.dynamics.wrench_matrix(robot.home)[rows], compute_uv=False)
     rank = int((at_home > INDEPENDENT * at_home[0]).sum())
     U, values, _ = np.linalg.svd(scale * seen.dynamics.wrench_matrix(seen.pose, seen.carriers)[:, rows])
