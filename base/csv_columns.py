@@ -42,6 +42,8 @@ def read_columns(
         titles = [printable(cell.strip()) for cell in _split(header, mark)]
         begin = _split(first[1][1], mark) if gaps and len(first) > 1 else []
         used = [k for k in range(len(titles)) if len(begin) != len(titles) or not _is_text(begin[k])]
+        if titles and not used:
+            raise InputError(f"line {first[1][0]} must have numbers below the header, got {shown(first[1][1].strip())}")
         for name, unit in _names_and_units([titles[k] for k in used]):
             if name in factors:
                 raise InputError(f"must have each column once, got {name} twice")

@@ -4,13 +4,18 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from towline.estimation.calibration import Measurements, mistake
 from towline.estimation.logs import read_log
+from towline.estimation.logs.encoders import unrolled
 from towline.estimation.logs.mapping import fields_of
 from towline.estimation.logs.names import time_unit
 from towline.estimation.logs.recorded import read_recorded
 from towline.estimation.logs.recording import Recording, Topic
+from towline.models import Dynamics, load
 
 from . import user_recordings as user
+from .recorded import motion
+from .robots_as_built import moved_anchors
 from .test_recordings_in_other_units import FULL, flight
 
 BESIDE = {"load_z": 0.35, "cf1_z": 0.05, "cf2_z": 0.05}  # [m]: a high load on the ground between its drones
@@ -108,3 +113,58 @@ def test_loops_of_1_khz_count_microseconds_or_nanoseconds(step, unit, tmp_path):
     log = user.write(tmp_path / "log.csv", ["t", "l0"], np.column_stack([times, np.ones(50)]))
     (note,) = read_log(log).notes
     assert f"t is read in {unit}" in note
+
+
+def test_one_wrong_reading_is_no_counter_that_begins_again():
+    """Neither of a size of its own nor near 1024 counts; a counter that is at its end for a while is one."""
+    t = np.arange(200)
+    smooth = np.column_stack([2 + 0.1 * np.sin(0.1 * t), 3 + 0.1 * np.cos(0.1 * t)])
+    for size in (1.6, 1000.0):
+        wrong = smooth.copy()
+        wrong[[40, 90], 0] += size
+        found, rolled = unrolled(wrong)
+        assert not rolled
+        np.testing.assert_array_equal(found, wrong)
+    counter = 1024 + 3 * np.sin(0.1 * t) + np.random.default_rng(0).normal(0, 0.5, 200)
+    assert (np.diff(np.flatnonzero(np.abs(np.diff(counter % 1024)) > 900)) == 1).any()  # forth and back at once
+    found, rolled = unrolled((counter % 1024)[:, None])
+    assert rolled
+    np.testing.assert_allclose(np.diff(found[:, 0]), np.diff(counter), atol=1e-9)
+
+
+def sound_log(name, share, turn=0.002, noise=2e-3, seconds=30):
+    """A robot whose anchors are 1 mm off, poses of a small motion with noise of angles [rad], and lengths."""
+    robot, draw = load(name), np.random.default_rng(0)
+    size = np.repeat([share * robot.length, turn], [3, 3])
+    poses = motion(robot, np.linspace(0, seconds, 300), size)
+    lengths = Dynamics(moved_anchors(robot, draw, 1e-3)).cable_lengths(poses)
+    lengths += draw.normal(0, 3e-4, lengths.shape)
+    return robot, poses + np.repeat([3e-4, noise], [3, 3]) * draw.normal(size=poses.shape) * robot.dof_mask, lengths
+
+
+@pytest.mark.parametrize("name", ["cogiro", "planar-4"])
+def test_noise_of_angles_of_a_platform_that_hardly_turns_is_no_other_unit(name):
+    """Degrees instead of radians, as other frames, would make it smaller; degrees of a platform that turns do, too."""
+    robot, poses, lengths = sound_log(name, share=0.2, noise=4e-3)
+    assert mistake(robot, Measurements(lengths, poses)) is None
+    robot, poses, lengths = sound_log(name, share=0.2, turn=0.15, noise=1e-3)
+    found = mistake(robot, Measurements(lengths, poses * np.repeat([1, 180 / np.pi], [3, 3])))
+    assert "degrees read as radians" in found.text
+    np.testing.assert_allclose(found.corrected.poses, poses, atol=1e-9)
+
+
+def test_a_slip_is_no_mistake_of_the_log_and_hides_none():
+    """It is larger than the motion."""
+    robot, poses, lengths = sound_log("cogiro", share=0.03, noise=1e-4)
+    lengths[90:, 0] += 0.1 * robot.length
+    assert mistake(robot, Measurements(lengths, poses)) is None
+    found = mistake(robot, Measurements(lengths[:, [1, 0, *range(2, 8)]], poses))
+    assert found is not None
+    assert found.text.startswith("l0 and l1 look exchanged")
+
+
+@pytest.mark.parametrize(("share", "turn", "every"), [(0.1, 0.3, 1), (1.2, 0.5, 10)])
+def test_angles_that_were_not_recorded_are_no_other_units(share, turn, every):
+    """Displaced anchors of a robot that moves for hundreds of metres, or a scale of each cable, would explain them."""
+    robot, poses, lengths = sound_log("planar-4", turn=turn, share=share, seconds=3)
+    assert mistake(robot, Measurements(lengths[::every], poses[::every, :3])) is None

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ...models import points
 from ...models.robot import Robot
@@ -20,6 +21,8 @@ PLAUSIBLE = 0.03  # of a cable's length, by which its ends may be displaced
 STRIDE = 5  # between the samples that the roughness is computed from
 WRONG, MOST_WRONG = 6.0, 0.2  # median sizes, beyond which samples are left out, and how many may be
 MOST_ROUNDS = 4  # of leaving out samples
+MOST_NOISE = 0.02  # [rad], of measured angles
+SLIPPED = 3.0  # times smaller differences without a slip
 AS_GIVEN = Interpretation("")
 
 
@@ -44,6 +47,17 @@ class LogPart(NamedTuple):
         """Return the log without some samples (N,) of bool."""
         parts = {name: getattr(self, name)[~samples] for name in ("position", "rotation", "angles", "y")}
         return self._replace(**parts, carriers=None if self.carriers is None else self.carriers[~samples])
+
+    def steady(self) -> LogPart:
+        """Return the log with one orientation if those measured hardly change, and it leaves smaller differences.
+
+        They are noise then, which other conventions of angles or frames would make smaller.
+        """
+        if float(np.sqrt(self.angles.var(axis=0).sum())) > MOST_NOISE or len(self.y) < 2:
+            return self
+        rotation = np.broadcast_to(Rotation.from_matrix(self.rotation).mean().as_matrix(), self.rotation.shape)
+        other = self._replace(rotation=rotation, angles=np.broadcast_to(self.angles.mean(axis=0), self.angles.shape))
+        return min(self, other, key=lambda one: float(medians(one.sound(0)[1], len(one.y)).sum()))
 
     def at(self, way: Interpretation) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
         """Return positions, rotations and poses of carriers as another interpretation reads them."""
@@ -79,15 +93,28 @@ class LogPart(NamedTuple):
     def sound(self, rounds: int = MOST_ROUNDS) -> tuple[LogPart, np.ndarray]:
         """Return the log and its differences as given, (m, N + c), without samples in which these are far too large.
 
-        Cables may be slack at first, and displaced ends of cables would make up for this.
+        Cables may be slack at first, and displaced ends of cables would make up for this. Winches may slip.
         """
         lengths, y = self.parts(AS_GIVEN)
         order = np.arange(len(lengths))
         left = lengths - y[order, order]
         e = np.abs(left[:, : len(self.y)])
         wrong = np.asarray((e > WRONG * np.median(e, axis=1, keepdims=True)).any(axis=0))
-        done = rounds == 0 or not wrong.any() or wrong.mean() > MOST_WRONG
-        return (self, left) if done else self.without(wrong).sound(rounds - 1)
+        if rounds and wrong.any() and wrong.mean() <= MOST_WRONG:
+            return self.without(wrong).sound(rounds - 1)
+        return self._without_slips(left) if rounds else (self, left)
+
+    def _without_slips(self, left: np.ndarray) -> tuple[LogPart, np.ndarray]:
+        """Return the log with differences `left`, (m, N + c), without the step that a slip of a winch explains."""
+        count, y, cables = len(self.y), self.y.copy(), np.arange(len(left))
+        if count < FEWEST[1]:
+            return self, left
+        steps = np.diff(left[:, :count], axis=1)
+        at = np.abs(steps).argmax(axis=1)
+        y += np.where(np.arange(count)[:, None] > at, steps[cables, at], 0.0)
+        lengths, readings = self._replace(y=y).parts(AS_GIVEN)
+        slipped = medians(lengths - readings[cables, cables], count) < medians(left, count) / SLIPPED
+        return self._replace(y=np.where(slipped, y, self.y)).sound(0) if slipped.any() else (self, left)
 
     def roughness(self, ways: list[Interpretation]) -> np.ndarray:
         """Return the median difference that offsets do not explain in each of some ways (w,), by a few samples [m]."""

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.text import quantity
-from .differences import AS_GIVEN, LogPart, medians
+from .differences import LogPart, medians
+from .geometry import length_of
 from .interpretations import FACTORS, Interpretation, interpretations
 
 CLEARLY, VERY_CLEARLY = 1.25, 2.0  # times smaller differences
@@ -22,6 +23,7 @@ BY_CHANCE = 3.0  # standard deviations by which the squares of noise may exceed 
 LONG_TAIL = 4.0  # median sizes; differences beyond are wrong readings
 HOPELESS = 2.0  # a convention is rejected if the roughness is so many times larger
 OTHER_FACTOR, SAME_FACTOR = 0.1, 0.01  # difference of a factor from 1, and from the factor of a unit
+FARTHEST = 3.0  # times the cables' mean length, of a motion
 
 
 class Way(NamedTuple):
@@ -40,13 +42,15 @@ def explanations(log: LogPart, e: np.ndarray, noise: float) -> tuple[list[Way], 
     """Return explanations of differences e (m, N), and the size of these as they are."""
     from scipy.optimize import linear_sum_assignment
 
-    order, as_given = np.arange(log.robot.m), np.inf
+    order, as_given, farthest = np.arange(log.robot.m), np.inf, FARTHEST * length_of(log.robot)
+    unseen = bool(log.robot.dof_mask[3:].any()) and not log.angles.any()
     ways: list[Way] = []
     conventions: list[tuple[np.ndarray, Way]] = []
     tried = interpretations(bool(np.ptp(log.angles, axis=0).any()))
     base, rough = log.parts(tried[0]), log.roughness(tried)
     for way, own in zip(tried, rough, strict=True):
-        if way.turned and own > HOPELESS * rough[0]:
+        too_far = log.carriers is None and np.ptp(way.placed(log.position), axis=0).max() > farthest
+        if (way.turned and own > HOPELESS * rough[0]) or (way.text and too_far):
             continue
         lengths, y = log.parts(way) if way.placed is not tried[0].placed or way.turned else base
         both = np.stack([lengths[:, None] - sign * way.factor * y for sign in (1, -1)]) / way.factor
@@ -71,7 +75,7 @@ def explanations(log: LogPart, e: np.ndarray, noise: float) -> tuple[list[Way], 
             weighted = VERY_CLEARLY * least * (min(size, gain * as_given) if not way.text else size)
             ways.append(Way(weighted, size, text, way, columns, signs))
         if way.factor == 1.0:
-            ways += _multiples(lengths, y, len(log.y), way)
+            ways += _multiples(lengths, y, len(log.y), way, unseen)
     likeliest = _likeliest(e, conventions)
     if likeliest is not None:
         # Errors that are no noise may seem smaller in another convention by chance.
@@ -80,10 +84,11 @@ def explanations(log: LogPart, e: np.ndarray, noise: float) -> tuple[list[Way], 
     return ways, as_given
 
 
-def _multiples(lengths: np.ndarray, y: np.ndarray, count: int, way: Interpretation = AS_GIVEN) -> list[Way]:
+def _multiples(lengths: np.ndarray, y: np.ndarray, count: int, way: Interpretation, unseen: bool) -> list[Way]:
     """Return the explanation that readings count something whose size is another one for each cable, or nothing.
 
     - `lengths`, `y`: as `LogPart.parts` returns them for `count` samples, read in a `way`.
+    - `unseen`: True if turns of the platform were not measured, for which other sizes of each cable would make up.
     """
     from scipy.optimize import linear_sum_assignment
 
@@ -101,6 +106,8 @@ def _multiples(lengths: np.ndarray, y: np.ndarray, count: int, way: Interpretati
         return []
     unit = float(np.median(sizes))
     similar = bool((np.abs(sizes / unit - 1) < OTHER_FACTOR).all())
+    if unseen and not similar:
+        return []
     listed = [unit] if similar else sizes.tolist()
     text = f"the lengths look like multiples of {', '.join(quantity(one, 'm', 3) for one in listed)}"
     text = with_order(f"{text}, such as a drum's angles", columns, factors)

@@ -53,7 +53,7 @@ def aligned(robot: Robot, given: Measurements, rows: np.ndarray, table: np.ndarr
     """
     moved, clock = realigned(robot, given, rows)
     sure = clock is not None and clock.likeness > LIKE and abs(clock.offset) > SURELY * clock.sigma
-    return part_of(robot, moved, table) if sure else None
+    return part_of(robot, moved, table).steady() if sure else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,7 +46,7 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     known = measured(given)
     framed = given.carrier_poses is None and bool((known.any(axis=0) | (robot.dof_mask == 0))[3:].all())
     rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), MOST_SAMPLES)).astype(int)]
-    log, e = part_of(robot, given.only(rows), table).sound()
+    log, e = part_of(robot, given.only(rows), table).steady().sound()
     if not is_noise(log, e) and (by_speeds := aligned(robot, given, rows, table)) is not None:
         log, e = by_speeds.sound()
     e = e[:, : len(log.y)]

@@ -162,7 +162,7 @@ def _correlated(
 
 def _gain(likeness: Any, shared: Any) -> Any:
     """Return the gain of the log-likelihood by a correlation, for records that share more or less time."""
-    return -shared * np.log1p(-(np.minimum(likeness, 0.99999) ** 2))
+    return -shared * np.log1p(-(np.clip(likeness, -0.99999, 0.99999) ** 2))
 
 
 def _rates(times: np.ndarray, values: np.ndarray, apart: float) -> tuple[np.ndarray, np.ndarray]:

@@ -116,8 +116,8 @@ def _one_header(text: str) -> str:
     # Where each channel has times of its own, their columns have one name.
     names = [f"{names[0]} of {names[k + 1]}" if k and name == names[0] else name for k, name in enumerate(names)]
     titles = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True)]
-    numbers = text.split("\n", first)[-1] if "\n" in text else ""
-    return "\n" * (first - 1) + mark.join(titles) + "\n" + numbers  # empty lines keep the numbers of lines
+    above = sum(map(len, text[:LONGEST_HEADER].splitlines(keepends=True)[:first]))
+    return "\n" * (first - 1) + mark.join(titles) + "\n" + text[above:]  # empty lines keep the numbers of lines
 
 
 def _rows_of_names(lines: list[str], table: list[list[str]], width: int) -> list[list[str]] | None:

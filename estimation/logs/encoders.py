@@ -5,6 +5,7 @@ import numpy as np
 from ...models.robot import Robot
 
 LOCKED = 1e-4  # of a length, by which noise may change the reading of a locked winch
+RETURNED = 2.0  # times the largest usual step, from a usual period, of a counter that jumps forth and back at once
 ROLLED, END = 0.9, 0.05  # of the range of readings: a jump from one end to the other, and what is near an end
 PERIODS = (*(2.0**k for k in range(8, 33)), 360.0, 2 * np.pi)  # of counters, and of angles in deg and rad
 
@@ -62,6 +63,8 @@ def unrolled(readings: np.ndarray) -> tuple[np.ndarray, list[int]]:
             usual = abs(nearest - period) <= END * period
             if not usual and len(jumps) == 1:
                 continue
+            if (np.diff(jumps) == 1).any() and abs(nearest - period) > RETURNED * np.abs(smooth).max():
+                continue  # a single wrong reading
             result = result if rolled else readings.copy()
             result[rows, i] = np.unwrap(y, period=nearest if usual else period)
             rolled.append(i)

@@ -178,9 +178,8 @@ def _named(recordings: Sequence[Recording], what: str, given: LogMap, free: str 
     result: list[Field] = []
     for text in texts:
         match = TITLE.fullmatch(text.strip())
-        assert match is not None
-        name, unit = match[1], match[2] or ""
-        found = list(_matching(recordings, name))
+        name, unit = (match[1], match[2] or "") if match else ("", "")
+        found = list(_matching(recordings, name)) if match else []
         if not found:
             raise _not_there(f"{what} must name fields of the log", name, recordings)
         for recording, topic, field in found:

@@ -3,6 +3,7 @@
 import io
 import os
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,7 @@ BEGINS = {
     b"#ROSBAG V": "a bag of ROS 1",
     b"SQLite format 3\0": "a bag of ROS 2",
 }
+PACKED = {b"\x1f\x8b": "gzip", b"PK\3\4": "zip", b"BZh": "bzip2", b"\xfd7zXZ": "xz", b"\x28\xb5\x2f\xfd": "zstd"}
 PARTS = (".mcap", ".db3")  # of a folder that is a bag of ROS 2
 NANOSECONDS = re.compile(r"(?i)(?:nsecs?|nanosec(?:ond)?s?)$")
 MOST_FIELDS = 40_000_000  # of a CSV file
@@ -110,8 +112,11 @@ def from_csv(content: bytes, where: str) -> Recording:
     """Return the columns of a CSV file."""
     if not content or content.isspace():
         raise InputError("must be a CSV, NetCDF or MCAP file or a ROS bag, got an empty file")
+    if packed := next((kind for magic, kind in PACKED.items() if content.startswith(magic)), None):
+        raise InputError(f"must be {WHAT}, got one that is packed ({packed}); unpack it first")
     try:
-        text = content.decode("utf-8-sig")
+        wide = content[:2] in (BOM_UTF16_LE, BOM_UTF16_BE) and content[2:4] != b"\0\0"  # spreadsheets: "Unicode text"
+        text = content.decode("utf-16" if wide else "utf-8-sig").lstrip("\ufeff")
     except UnicodeDecodeError as error:
         if CONTROLS.search(content):
             raise InputError(f"must be a CSV file in UTF-8, or NetCDF, got other bytes (byte {error.start})") from None
@@ -181,7 +186,7 @@ def from_netcdf(content: bytes, where: str) -> Recording:
             check_heaps(content)
             there = check_hdf5(file, len(content), _is_read, ALWAYS_ACCEPTED)
             arrays = {
-                name: (np.asarray(variable[...]), _attributes(variable))
+                name: (_unpacked(variable), _attributes(variable))
                 for name, variable in there.items()
                 if variable.dtype.kind in "fiu"
             }
@@ -270,12 +275,23 @@ def _is_read(name: str) -> bool:
     return bool(role(name)) or name in (*WRITTEN, *OF_CARRIERS, *OTHERS)
 
 
+def _unpacked(variable: Any) -> np.ndarray:
+    """Return the values of a variable of NetCDF, which may be packed as whole numbers (CF conventions)."""
+    values = np.asarray(variable[...])
+    known = {name: variable.attrs[name] for name in ("scale_factor", "add_offset") if name in variable.attrs}
+    missing = variable.attrs.get("_FillValue")
+    if missing is not None and (lost := values == missing).any():
+        values = np.where(lost, np.nan, values)
+    scale, offset = (np.float64(known.get(name, one)).item() for name, one in (("scale_factor", 1), ("add_offset", 0)))
+    return values * scale + offset if known else values
+
+
 def _attributes(of: Any) -> dict[str, Any]:
     """Return the texts and single numbers among the attributes of a file or a variable."""
     result: dict[str, Any] = {}
     for name in of.attrs:
         if name in ("units", "framed") or name.startswith("sigma_"):
             value = np.asarray(of.attrs[name]).ravel()
-            text = value[0] if value.size == 1 else ""
+            text = value.item() if value.size == 1 else ""
             result[name] = text.decode("utf-8") if isinstance(text, bytes) else text
     return result

@@ -70,7 +70,7 @@ class Reader:
                 if np.nanmax(times, initial=0.0) < DAY:  # times of day, which begin again at midnight
                     times = times + DAY * np.cumsum(steps < -0.5 * DAY)
                 again = steps == 0
-                if 0 < again.mean() <= MOST_REPEATED:
+                if 0 < again.sum() <= MOST_REPEATED * len(again):
                     count = quantity(int(again.sum()))
                     self.notes.append(f"samples skipped because they repeat the time of the one before: {count}")
                     times, values = times[~again], values[~again]
@@ -198,7 +198,7 @@ def frozen(values: np.ndarray) -> np.ndarray:
     A platform at rest does not jump at the end.
     """
     result = np.zeros(len(values), dtype=bool)
-    steps = np.linalg.norm(np.diff(np.nan_to_num(values), axis=0), axis=1)
+    steps = np.linalg.norm(np.diff(np.nan_to_num(values, posinf=0.0, neginf=0.0), axis=0), axis=1)
     moves = np.flatnonzero(steps > 0)
     if not moves.size:
         return result
