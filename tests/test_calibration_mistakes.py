@@ -339,3 +339,18 @@ def test_mistakes_with_cables_that_stretch_by_measured_tensions(what):
     found = correction_of(robot, log)
     np.testing.assert_allclose(found.measurements.lengths * found.robot.encoders[:, 1], readings, atol=1e-9)
     np.testing.assert_allclose(found.measurements.tensions, measured, atol=1e-9)
+
+
+def test_cable_speeds_in_a_wrong_frame_show_no_clock():
+    """Poses with y upwards look at the beginning as the platform moves 18 s later, but the log has one clock."""
+    robot, draw, times = load("cogiro"), np.random.default_rng(0), np.arange(0, 30, 0.1)
+    later = motion(robot, times - 18.5)  # as it is seen at the beginning
+    up = Rotation.from_euler("x", 90, degrees=True)
+    begin = seen(motion(robot, times), (NONE[0], up.inv()), (NONE[0], up))
+    share = np.clip((times - 11.5) / 7, 0, 1)[:, None]
+    poses = begin + share**2 * (3 - 2 * share) * (later - begin)
+    y = Dynamics(moved_anchors(robot, draw)).cable_lengths(poses) + draw.normal(0, 1e-3, (len(times), robot.m))
+    found = mistake(robot, Measurements(y, seen(poses, (NONE[0], up), (NONE[0], up.inv())), times=times))
+    assert found is not None
+    assert "in axes of which y points up" in found.text
+    np.testing.assert_allclose(found.corrected.poses, poses, atol=1e-9)

@@ -32,6 +32,7 @@ SCALED = 2  # fits of frames with the scales of readings that were found with th
 EXPLAINED = 0.1  # of the change of the readings, which differences are below if lengths and poses belong together
 FAR = 3.0  # times the noise, of differences that are not explained yet
 MOST_STRETCHED = 1.05  # of a length: no cable is stretched more
+LATEST = 0.1  # of a log's duration; speeds in a wrong frame may look similar at any other time
 STILL = 2e-3  # of a length, by which the reading of a locked winch with noise may change
 Placed = tuple[np.ndarray, np.ndarray, np.ndarray | None]  # positions, rotations, and poses of carriers
 
@@ -52,7 +53,10 @@ def aligned(robot: Robot, given: Measurements, rows: np.ndarray, table: np.ndarr
     A clock of the poses that is ahead is explained by no other frame or convention.
     """
     moved, clock = realigned(robot, given, rows)
-    sure = clock is not None and clock.likeness > LIKE and abs(clock.offset) > SURELY * clock.sigma
+    if clock is None or given.times is None:
+        return None
+    latest = LATEST * float(np.ptp(given.times))
+    sure = clock.likeness > LIKE and SURELY * clock.sigma < abs(clock.offset) < latest
     return part_of(robot, moved, table).steady() if sure else None
 
 
