@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 
 from towline import InputError, tensions
 from towline.benchmarks.scenes import APART, GATE, LENGTH, LOAD, QUADROTOR, TREES, forest, window
-from towline.models import load
+from towline.models import Robot, load
 from towline.ocp import Planner, plan
 from towline.ocp.global_path.at_rest import AtRest
 from towline.ocp.global_path.clear_space import ClearSpace
@@ -273,6 +273,20 @@ def test_a_load_all_the_way_hangs_on_a_path_as_the_weight_of_a_heavier_platform_
     assert 0 < (others.worst == -1).sum() < 300
     np.testing.assert_array_equal(kept.slack, others.slack)
     assert is_open(ours)
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_a_quadrotor_at_rest_needs_a_thrust_that_carries_itself_and_the_platform(share):
+    data = load("wang-flying-quadrotor").model_dump()
+    (quadrotor,) = data["carriers"]
+    quadrotor["thrust_max"] = share * 9.81 * (quadrotor["mass"] + data["platform"]["mass"])
+    robot = Robot.model_validate(data)
+    path = {"kind": "line", "start": robot.home.tolist(), "end": (robot.home + np.eye(6)[0]).tolist()}
+    scenario = scenario_of([], robot, path=path, tube={}, base={"kind": "free", "ends": "rest"})
+    kept = AtRest(scenario, 1.0, spare=0.0)(robot.home[None], robot.carrier_home[None])
+    names = [limit.name for limit in scenario.limits]
+    assert (names[kept.worst[0]] == "thrust") == (share < 1)
+    assert kept.slack[0] == pytest.approx(min(1 - 1 / share, 0.0), abs=1e-6)
 
 
 @pytest.mark.parametrize("name", ["cogiro", "ipanema-1"])
