@@ -11,11 +11,12 @@ from towline.ocp.audits.excess import Excess
 from towline.ocp.nlp import solver
 from towline.ocp.nlp.guess import initial_guess, usual_guess
 from towline.ocp.nlp.linear import LinearDistances
-from towline.ocp.nlp.near import Near, is_local, parts
+from towline.ocp.nlp.near import Near, is_local, parts, regions_near
 from towline.ocp.nlp.program import build
 from towline.ocp.nlp.rows import Mesh
 from towline.ocp.planner import Planner
-from towline.ocp.search import search
+from towline.ocp.search import feasible_changes, search
+from towline.ocp.search.other_forces import larger_t_max
 from towline.ocp.search.refinement import _tightened
 from towline.ocp.tasks.lay_out import lay_out
 
@@ -206,3 +207,73 @@ def test_another_pair_of_one_limit_is_tightened_beyond_what_all_pairs_have():
     both = [Excess.of(limit, index, 0.5, limit.low - 1e-4 * limit.scale) for index in (0, 1)]
     together = replace(mesh, further=_tightened(scenario, SimpleNamespace(excess=both), mesh.further, 1.1))
     assert together.shrink_of(limit) == pytest.approx(4.1e-4, rel=1e-9)
+
+
+def without_rows(scenario, shares):
+    """Return the places of no rows of regions."""
+    everywhere = Near.everywhere(scenario, shares)
+    local = [is_local(scenario.limits.all[index]) for index, _ in parts(scenario.limits)]
+    return replace(everywhere, chosen=everywhere.chosen & ~np.array(local)[:, None])
+
+
+def test_a_run_ends_early_in_a_region_of_which_the_program_has_no_rows(monkeypatch):
+    empty = plan("ipanema-1", TASK | {"limits": {}})
+    centre = empty.scenario.motion(np.array([2.0]), empty.deviation)[0].pose[0, :3]  # in the way of the best motion
+    task = TASK | {"limits": {"keep_out": [BALL | {"centre": centre.tolist()}]}}
+    scenario, mesh = scenario_of(task), Mesh(40)
+    whole = build(scenario, mesh)
+    part = build(scenario, mesh, without_rows(scenario, whole.shares))
+    through = empty.deviation.at(whole.shares * scenario.duration)
+    beside = replace(through, q=through.q + 0.8 * np.eye(through.q.shape[1])[1])
+    assert part.strays(part.pack(through))
+    assert not part.strays(part.pack(beside))
+    assert not whole.strays(whole.pack(through))
+    monkeypatch.setattr(solver, "LOOK", 3)
+    ended = solver.Solver(part).solve(beside, stray=False)
+    assert (ended.message, ended.success) == (solver.STRAYED, False)
+    assert solver.Solver(part).solve(beside).iterations > ended.iterations
+    assert solver.Solver(whole).solve(beside, stray=False).message != solver.STRAYED
+    found = plan("ipanema-1", task)
+    assert found.feasible
+    poses = found.scenario.motion(np.linspace(0, 4, 2000), found.deviation)[0].pose
+    assert np.linalg.norm(poses[:, :3] - centre, axis=1).min() > 0.25 + 0.05 - 1e-6
+
+
+def test_regions_near_a_motion_are_those_that_it_comes_near():
+    scenario = scenario_of(TASK)
+    motion = initial_guess(scenario, np.linspace(0, 4, 41))
+    assert [region.name for region in regions_near(scenario, motion, 0.05)] == ["ball"]
+    assert regions_near(scenario, motion, 10.0) == scenario.task.limits.keep_out
+
+
+def test_smaller_clearances_are_not_searched_where_even_none_would_not_do(monkeypatch):
+    """The tube lets the platform out of the ball nowhere: a way round is offered, and no program is solved for less."""
+    called = []
+    monkeypatch.setattr(feasible_changes, "solved", lambda *arguments: called.append(arguments))
+    blocked = TASK | {"tube": {"position": 0.05}, "limits": {"keep_out": [BALL | {"centre": [0.2, 0, 1.2]}, FAR]}}
+    found = plan("ipanema-1", blocked)
+    assert found.status == "infeasible"
+    assert [each.name for each in found.relaxations] == ["length of a way round"]
+    assert not called
+    poses = found.relaxations[0].plan.scenario.motion(np.linspace(0, 4, 2000), found.relaxations[0].plan.deviation)[0]
+    assert np.linalg.norm(poses.pose[:, :3] - [0.2, 0, 1.2], axis=1).min() > 0.25 + 0.05 - 1e-6
+
+
+@pytest.mark.parametrize("limit", [{}, {"tension_rate": 1e3}, {"winch_power": 1e4}])
+def test_robots_with_other_tension_limits_have_the_same_distances(limit):
+    scenario = scenario_of(TASK | {"limits": TASK["limits"] | limit})
+    stronger = larger_t_max(scenario).at(0.5)[0]
+    assert stronger.robot.t_max[0] > scenario.robot.t_max[0]
+    assert (stronger.limits is scenario.limits) == (not limit)
+    fresh = lay_out(stronger.robot, scenario.task).limits
+    poses, frame = np.random.default_rng(0).uniform(-0.3, 0.3, (20, 6)) + np.eye(6)[2], np.zeros((20, 1, 6))
+    for mine, its in zip(stronger.limits.at_rest(poses, frame), fresh.at_rest(poses, frame), strict=True):
+        np.testing.assert_array_equal(mine, its)
+
+
+def test_a_change_of_one_scenario_is_made_once():
+    made = []
+    make = feasible_changes._once(lambda scenario: made.append(scenario) or len(made))
+    first, second = scenario_of(TASK), scenario_of(TASK)
+    assert [make(first), make(second), make(first), make(second)] == [1, 2, 1, 2]
+    assert made == [first, second]

@@ -1,8 +1,12 @@
 """`AtRest`: by how much a robot at rest keeps its task's limits, for many poses in one call."""
 
-from functools import cached_property
-from typing import NamedTuple
+from __future__ import annotations
 
+from functools import cached_property
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import casadi as ca
 import numpy as np
 
 from ...models.batch import in_blocks
@@ -12,11 +16,13 @@ from ..limits import Limit, Rate
 from ..nlp.guess import with_tilts
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
+from .body_bounds import BodyBounds
 
 UNKNOWN = 2.0  # metres by which a limit may change while what moves moves by one, if the limit does not state it
 SPARE = 0.01  # of the weight, from the limits of tensions: a motion needs more than rest does
 BALANCED = 1e-9  # of the weight
 FINEST = 1e-3  # [m]
+ENOUGH = 0.05  # of the size of a body: a distance of which a lower bound is larger is not evaluated
 MISSED = 0.1  # of the weight, which few cables cannot balance to the last bit; the program can
 
 
@@ -40,16 +46,35 @@ class AtRest:
         self.scenario, self.size, self.spare, self.balance = scenario, size, spare, balance
 
     @cached_property
-    def _checked(self) -> list[tuple[int, Limit, slice, float]]:
-        """Return the limits that rest can exceed: index, limit, place among the values, and metres per unit of it."""
-        limits, checked = self.scenario.limits, []
-        for k, (limit, place) in enumerate(zip(limits, limits.places, strict=True)):
+    def _checked(self) -> list[tuple[int, Limit, float]]:
+        """Return the limits that rest can exceed: index, limit, and metres per unit of it."""
+        checked = []
+        for k, limit in enumerate(self.scenario.limits):
             if limit.soft is not None or limit.is_equation or isinstance(limit, Rate):
                 continue
             known = limit.per_metre if np.isfinite(limit.per_metre) else UNKNOWN
-            unit = 1.0 / known if limit.unit == "m" else self.size / limit.scale
-            checked.append((k, limit, place, unit))
+            checked.append((k, limit, 1.0 / known if limit.unit == "m" else self.size / limit.scale))
         return checked
+
+    @cached_property
+    def _bodies(self) -> BodyBounds:
+        return BodyBounds([limit for _, limit, _ in self._checked])
+
+    @cached_property
+    def _others(self) -> list[tuple[int, Limit, float]]:
+        """Return the checked limits that are evaluated for all poses."""
+        of_bodies = {limit for pair in self._bodies.pairs for limit in pair}
+        return [each for each in self._checked if each[1] not in of_bodies]
+
+    def _values(self, limits: tuple[Limit, ...], arguments: list[np.ndarray]) -> np.ndarray:
+        """Return the values of some limits, (n, k)."""
+        if limits not in self._functions:
+            self._functions[limits] = self.scenario.limits.function_of(limits)
+        return in_blocks(self._functions[limits], arguments, 1)[0]
+
+    @cached_property
+    def _functions(self) -> dict[tuple[Limit, ...], ca.Function]:
+        return {}
 
     def __call__(self, platform: np.ndarray, carriers: np.ndarray, off_path: np.ndarray | None = None) -> Kept:
         """Return by how much limits are kept by platform (n, 6) and carriers (n, c, 6)."""
@@ -122,31 +147,57 @@ class AtRest:
         self, platform: np.ndarray, carriers: np.ndarray, tensions: np.ndarray, off_path: np.ndarray | None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the smallest slack of all limits (n,) [m], and the index of its limit."""
-        n, checked = len(platform), self._checked
-        if not checked:
-            return np.full(n, np.inf), np.zeros(n, int)
-        bodies = [np.hstack([pose, np.zeros((n, 12))]) for pose in (platform, *carriers.swapaxes(0, 1))]
-        off_path = np.zeros((n, 6)) if off_path is None else off_path
-        (table,) = in_blocks(self.scenario.limits.function, [*bodies, tensions, off_path], 1)
-        at = np.zeros(n)
-        for _, limit, place, _ in checked:
-            if type(limit).over is not Limit.over:
-                table[:, place] = limit.over(at, table[:, place])
-        columns, owner, low, high, unit = self._columns
-        table = table[:, columns]
-        slack = np.minimum(table - low, high - table) * unit
-        slack[np.isnan(slack)] = -np.inf
-        least = slack.argmin(axis=1)
-        return slack[np.arange(n), least], owner[least]
+        n = len(platform)
+        moving = [np.hstack([pose, np.zeros((n, 12))]) for pose in (platform, *carriers.swapaxes(0, 1))]
+        arguments = [*moving, tensions, np.zeros((n, 6)) if off_path is None else off_path]
+        slack, worst = np.full(n, np.inf), np.zeros(n, int)
+        if self._others:
+            table = self._values(tuple(limit for _, limit, _ in self._others), arguments)
+            columns, owner, low, high, unit = self._columns
+            at = np.zeros(n)
+            for _, limit, place in columns:
+                if type(limit).over is not Limit.over:
+                    table[:, place] = limit.over(at, table[:, place])
+            kept = np.minimum(table - low, high - table) * unit
+            kept[np.isnan(kept)] = -np.inf
+            least = kept.argmin(axis=1)
+            slack, worst = kept[np.arange(n), least], owner[least]
+        return self._past_bodies(arguments, slack, worst) if self._bodies.pairs else (slack, worst)
+
+    def _past_bodies(
+        self, arguments: list[np.ndarray], slack: np.ndarray, worst: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the smallest slack and its limit where distances of bodies from regions count too.
+
+        A distance is evaluated only where its bound permits that it is small, and smaller than all others.
+        """
+        bodies = self._bodies
+        bounds, enough = bodies(arguments[0][:, :6]), ENOUGH * bodies.size
+        for row in np.flatnonzero(bounds.min(axis=1) < np.minimum(slack, enough)):
+            here = [each[row : row + 1] for each in arguments]
+            least = min(float(slack[row]), enough)
+            for pair in np.argsort(bounds[row]):
+                if bounds[row, pair] >= least:
+                    break
+                its = bodies.pairs[pair]
+                bounds[row, pair] = self._values(its, here).min() - its[0].low
+                least = min(least, bounds[row, pair])
+        nearest = bounds.argmin(axis=1)
+        of_bodies = bounds[np.arange(len(bounds)), nearest]
+        index = {limit: k for k, limit, _ in self._checked}
+        owner = np.array([index[pair[0]] for pair in bodies.pairs])
+        return np.minimum(slack, of_bodies), np.where(of_bodies < slack, owner[nearest], worst)
 
     @cached_property
-    def _columns(self) -> tuple[np.ndarray, ...]:
-        """Return which values are checked, the limit of each, its bounds, and metres per unit of it, (k,) each."""
-        columns = [np.arange(place.start, place.stop) for _, _, place, _ in self._checked]
-        each = [(k, limit.low, limit.high, unit) for k, limit, _, unit in self._checked]
-        counts = [len(its) for its in columns]
-        owner, low, high, unit = (np.repeat(part, counts) for part in zip(*each, strict=True))
-        return np.concatenate(columns), owner, low, high, unit
+    def _columns(self) -> tuple[Any, ...]:
+        """Return index, limit and values of each, then the limit of each value, its bounds, and metres per unit."""
+        every = self.scenario.limits.places
+        counts = [every[k].stop - every[k].start for k, *_ in self._others]
+        ends = np.cumsum([0, *counts])
+        places = [slice(*pair) for pair in pairwise(ends.tolist())]
+        each = [(k, limit.low, limit.high, unit) for k, limit, unit in self._others]
+        columns = [(k, limit, place) for (k, limit, _), place in zip(self._others, places, strict=True)]
+        return columns, *(np.repeat(part, counts) for part in zip(*each, strict=True))
 
 
 def unsure(slack: np.ndarray, points: np.ndarray, slope: float = 1.0) -> np.ndarray:

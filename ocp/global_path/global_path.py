@@ -274,12 +274,12 @@ def _clear_end(
     return inside(grown(space, first, score, np.minimum(free, 1.0), rng)[0])
 
 
-def motion_past(search: Search, balance: bool) -> tuple[Deviation | None, bool]:
+def motion_past(search: Search, balance: bool, most: tuple[int, int] | None = None) -> tuple[Deviation | None, bool]:
     """Return a motion past what the usual guess collides with, or the best guess, and whether it collides at all.
 
     None is the usual guess where no formation is better.
 
-    With `balance` a configuration without tensions at rest is a collision.
+    With `balance` a configuration without tensions at rest is a collision. `most` is as for `find_global_path`.
     """
     scenario = search.scenario
     if scenario.count == 0 or not is_open(scenario):
@@ -297,7 +297,7 @@ def motion_past(search: Search, balance: bool) -> tuple[Deviation | None, bool]:
             stage.message = f"the direct motion exceeds {exceeded}: a shifted or turned one keeps all limits"
             return formation(nodes), True
         seconds = min(GLOBAL_SHARE * scenario.task.time_limit, search.seconds_left)
-        path, message = find_global_path(scenario, seconds)
+        path, message = find_global_path(scenario, seconds, most)
         stage.message = f"the direct motion exceeds {exceeded}: {message}"
         if path is not None:
             return path.guess(scenario), True

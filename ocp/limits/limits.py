@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -19,6 +19,8 @@ from .distance import Distance, Pair
 from .limit import Limit
 from .state import Body, State
 
+# Operations: to find common subexpressions takes longer than a plan's evaluations gain by them, a tenth.
+MANY = 5000
 Motion: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]  # pose, velocity, acceleration
 
 
@@ -47,7 +49,9 @@ def of_motions(name: str, bodies: Sequence[Body], others: Sequence[ca.SX], value
     Inputs of bodies that never move have no effect.
     """
     symbols = [body if body.moves else Body.symbols() for body in bodies]
-    parts = ca.Function("of_parts", [part for body in symbols for part in body] + [*others], [*values], {"cse": True})
+    inputs = [part for body in symbols for part in body] + [*others]
+    small = ca.n_nodes(ca.veccat(*values)) < MANY
+    parts = ca.Function("of_parts", inputs, [*values], {"cse": small})
     whole = [ca.SX.sym(f"body{i}", 18) for i in range(len(bodies))]
     given = [part for body in whole for part in ca.vertsplit(body, 6)]
     return ca.Function(name, [*whole, *others], parts.call([*given, *others]))
@@ -105,7 +109,12 @@ class Limits(Displayed):
         Its inputs are the motion of the platform in {G} (18: pose, velocity, acceleration), those of all carriers (18
         each), the tensions [N] (m) and the platform's offset from its path (6).
         """
-        return of_motions("limits", self._bodies, self._others, [ca.vertcat(*self._values)])
+        return self.function_of(self.all)
+
+    def function_of(self, limits: Iterable[Limit]) -> ca.Function:
+        """Return the function of the values of some limits, with the same inputs."""
+        values = [self._values[self.all.index(limit)] for limit in limits]
+        return of_motions("limits", self._bodies, self._others, [ca.vertcat(*values)])
 
     @cached_property
     def places(self) -> list[slice]:
@@ -208,7 +217,7 @@ class Limits(Displayed):
             return []
         values = [self._values[self.all.index(limit)] for limit in chosen]
         if chosen not in self._blocks:
-            self._blocks[chosen] = of_motions("limits", self._bodies, self._others, [ca.vertcat(*values)]).map(BLOCK)
+            self._blocks[chosen] = self.function_of(chosen).map(BLOCK)
         n = len(platform[0])
         arguments = motions(platform, carriers)
         arguments.append(np.zeros((n, self.robot.m)) if tensions is None else tensions)

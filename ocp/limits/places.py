@@ -16,7 +16,7 @@ from typing_extensions import override
 
 from ...models import Robot, kinematics
 from ...models.part import Box
-from ...models.shapes import Shape, Skeleton, skeleton
+from ...models.shapes import Shape, skeleton
 from .cables import names
 from .clearance import cable_outside, point_outside
 from .distance import Distance, Pair
@@ -38,6 +38,7 @@ class Outside(Distance):
 
     def __init__(self, place: Shape, called: str, riding: bool, least: float):
         self.place, self.called, self._riding, self.low = place, called, riding, least
+        self.region = place  # in whose name it is
         self.thickness = place.thickness
         if riding:  # what is far from the platform moves farther in its frame than its points in {G}
             self.per_metre = np.inf
@@ -129,10 +130,11 @@ class BodyOutside(Outside):
 
     name, per_metre = "keep_out", 1.0  # of the region `riding` on the platform too: all corners of the body count
 
-    def __init__(self, whole: Shape, moving: Skeleton, whose: str, called: str, riding: bool, least: float):
-        super().__init__(whole, called, riding, least)
-        self.per_metre, self._moving = 1.0, moving
-        self.labels = (whose,) * len(moving.parts)
+    def __init__(self, body: Shape, region: Shape, whose: str, called: str, riding: bool, least: float):
+        super().__init__(body if riding else region, called, riding, least)
+        self.per_metre, self.body, self.region = 1.0, body, region
+        self._moving = skeleton(region if riding else body)
+        self.labels = (whose,) * len(self._moving.parts)
 
     @override
     def pairs(self, state: State) -> list[Pair]:
@@ -157,11 +159,11 @@ class BodyOutside(Outside):
 
 def body_outside(body: Shape, whose: str, place: Shape, called: str, least: float) -> Iterator[Distance]:
     """Yield the limits that keep a body in the platform's frame out of a region in {G}, by `least` [m]."""
-    own, its = skeleton(body), skeleton(place)
-    if its.solid or not own.solid:
-        yield BodyOutside(place, own, whose, called, False, least)
-    if own.solid:
-        yield BodyOutside(body, its, whose, called, True, least)
+    solid = skeleton(body).solid
+    if skeleton(place).solid or not solid:
+        yield BodyOutside(body, place, whose, called, False, least)
+    if solid:
+        yield BodyOutside(body, place, whose, called, True, least)
 
 
 class Inside(Distance):

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...base.display import Displayed
 from ..limits import Limit
-from ..limits.limits import Limits
+from ..limits.limits import MANY, Limits
 from ..tasks.scheme import Scheme
 from .held import eased
 from .near import is_local
@@ -282,16 +282,22 @@ def part_of(
 def _function_of_some(
     unknowns: dict[str, ca.SX], parameters: dict[str, ca.SX], values: ca.SX, picked: tuple[int, ...]
 ) -> Differentiable:
-    return function_of("near", unknowns, parameters, values[list(picked)])
+    its = values[list(picked)]
+    small = ca.n_nodes(its) < MANY  # common subexpressions of bodies with many faces take longest to find
+    return function_of("near", unknowns, parameters, its, small)
 
 
-def function_of(name: str, unknowns: dict[str, ca.SX], parameters: dict[str, ca.SX], value: ca.SX) -> Differentiable:
+def function_of(
+    name: str, unknowns: dict[str, ca.SX], parameters: dict[str, ca.SX], value: ca.SX, small: bool = True
+) -> Differentiable:
     """Return the function of all unknowns and of those parameters on which its value depends.
+
+    Common subexpressions of a `small` one are evaluated once.
 
     CasADi would differentiate with respect to the parameters too and throw the result away: a Hessian took 6 times as
     long.
     """
     inputs = unknowns | {key: each for key, each in parameters.items() if ca.depends_on(value, each)}
-    options = {"cse": True, "is_diff_in": [key in unknowns for key in inputs]}
+    options = {"cse": small, "is_diff_in": [key in unknowns for key in inputs]}
     function = ca.Function(name, [*inputs.values()], [value], [*inputs], ["value"], options)
     return Differentiable(function, sum(each.numel() for each in unknowns.values()))

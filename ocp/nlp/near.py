@@ -15,6 +15,7 @@ from ..limits.limits import Limits
 from ..limits.places import Inside
 from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
+from ..tasks.task_limits import AnyKeepOut
 
 BEND = 0.25  # of what a point moves in an interval: more than an arc is away from its chord
 
@@ -64,6 +65,12 @@ class Near(Displayed):
         slack, moved, _ = _kept(scenario, shares, motion)
         return not self._exceeded(slack, moved).any()
 
+    def strays(self, scenario: Scenario, shares: np.ndarray, motion: Deviation) -> bool:
+        """Return whether a motion is in a region that is left out there, deeper than a bend of its way would be."""
+        slack, moved, _ = _kept(scenario, shares, motion)
+        deep = slack[:, 1:-1] < -BEND * (moved[1:] + moved[:-1])
+        return bool((deep & ~self.chosen[:, 1:-1]).any())
+
     def _exceeded(self, slack: np.ndarray, moved: np.ndarray) -> np.ndarray:
         """Return where a motion may exceed a limit that is left out, at the points or beside them, (parts, points)."""
         left_out = ~self.chosen
@@ -109,6 +116,18 @@ def _holds(scenario: Scenario, shares: np.ndarray) -> np.ndarray:
 def has_places(scenario: Scenario) -> bool:
     """Return whether any hard limit of a scenario is a distance from a region."""
     return any(is_local(limit) and _is_of_place(limit) for limit in scenario.limits)
+
+
+def regions_near(scenario: Scenario, motion: Deviation, reach: float) -> tuple[AnyKeepOut, ...]:
+    """Return the keep-out regions of a task that are hard, and to which a motion comes as near as for `Near.along`."""
+    slack, _, extent = _kept(scenario, motion.nodes / motion.nodes[-1], motion)
+    limits = (scenario.limits.all[index] for index, _ in parts(scenario.limits))
+    near = {
+        id(getattr(limit, "region", None))
+        for limit, its in zip(limits, slack.min(axis=1), strict=True)
+        if its <= reach * extent
+    }
+    return tuple(region for region in scenario.task.limits.keep_out if id(region) in near)
 
 
 def jumps(scenario: Scenario, motion: Deviation) -> bool:

@@ -128,6 +128,10 @@ class Program(Displayed):
         """Return whether a motion can exceed no local limit where the program does not have its rows."""
         return self.near.is_everywhere or self.near.suffices(self.scenario, self.shares, motion)
 
+    def strays(self, x: np.ndarray) -> bool:
+        """Return whether the motion of unknowns x is deep in a region of which the program does not have the rows."""
+        return bool(np.isfinite(x).all()) and self.near.strays(self.scenario, self.shares, self.read(x))
+
     def violation(self, x: np.ndarray, g: np.ndarray) -> float:
         """Return the largest violation of the bounds by x and its constraints g; infinite if they are not numbers."""
         beyond = [self.lower - x, x - self.upper, self.lower_g - g, g - self.upper_g]

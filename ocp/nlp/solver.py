@@ -39,6 +39,8 @@ TEAM = {"mumps_pivtol": 1e-4, "mumps_pivot_order": 5}
 # IPOPT's default, 1e-8, with which each step is far from Newton's. A minimum time took 300 iterations; it takes 36.
 NEARLY_SINGULAR = {"jacobian_regularization_value": 1e-13}
 TIME_LIMIT, SETTLED = "time limit", f"no better by {BETTER:.1%} in {PATIENCE} iterations"  # messages of ours
+STRAYED = "in a region that is left out"  # likewise
+LOOK = 10  # iterations after which, again and again, a run ends where its motion has strayed
 CIRCLING = f"{ROUND} iterates that are neither better nor nearer"  # likewise
 Progress = Callable[[int, float, float], None]  # iteration, objective, infeasibility
 VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
@@ -152,14 +154,16 @@ class Solver:
         seconds: float = np.inf,
         parameters: ca.DM | None = None,
         near: bool = False,
+        stray: bool = True,
     ) -> Outcome:
         """Solve from `guess`; default: from the last solution and its multipliers, or else from a guess of our own.
 
         A guess is `coarser` if it is the same task's optimum on a coarser mesh. After so many `seconds` IPOPT
         stops with the best that it has. A run without a solution is a result, not an error. `parameters` belong
         to the program, if it has any; default: its own. A guess that is `near` the last solution starts
-        with its multipliers. Raises `SolverError` if CasADi or IPOPT break; `KeyboardInterrupt` if an interrupt
-        arrives; the solver's thread ends at its next iteration.
+        with its multipliers. A run that may not `stray` ends early in a region of which the program has no rows.
+        Raises `SolverError` if CasADi or IPOPT break; `KeyboardInterrupt` if an interrupt arrives; the solver's
+        thread ends at its next iteration.
         """
         program, watch = self.program, self._watch
         start: dict[str, Any] = {"p": program.parameters if parameters is None else parameters}
@@ -172,7 +176,7 @@ class Solver:
             guess = initial_guess(program.scenario, program.shares * program.scenario.duration)
         if guess is not None:
             start["x0"] = program.pack(guess)
-        watch.begin(progress, seconds)
+        watch.begin(progress, seconds, stray)
         self.interrupted = None
         try:
             result = wait_for(lambda: watch.follow(nlp, start), watch.errands)
@@ -192,6 +196,8 @@ class Solver:
             message = TIME_LIMIT if watch.late else SETTLED
             if watch.best:
                 x, objective, met, last = watch.best["x"], watch.objective, True, watch.best
+        elif watch.strayed:
+            message, met = STRAYED, False
         elif watch.circling:
             (x, objective), message = watch.nearest, CIRCLING
         self._last = last if statistics["success"] or (met and watch.settled) else None
@@ -245,12 +251,14 @@ class _Watch(ca.Callback):
         self.begin(None)
         self.construct("watch", {})
 
-    def begin(self, progress: Progress | None, seconds: float = np.inf) -> None:
+    def begin(self, progress: Progress | None, seconds: float = np.inf, stray: bool = True) -> None:
         """Start to count again from zero."""
         self._progress = progress
         self.errands: Errands = SimpleQueue()  # calls of `progress`, for the thread that waits
         self._deadline = time.perf_counter() + seconds
         self.late = False  # whether the time is up
+        self._looks = not (stray or self.program.near.is_everywhere)
+        self.strayed = False  # whether the motion is deep in a region of which the program has no rows
         self.iteration = 0
         self.best: dict[str, np.ndarray] = {}  # iterate of those that meet all constraints, with its multipliers
         self.objective = np.inf  # its
@@ -312,7 +320,8 @@ class _Watch(ca.Callback):
             self.errands.put(partial(self._progress, self.iteration, objective, infeasibility))
         self.iteration += 1
         self.late = time.perf_counter() > self._deadline
-        np.frombuffer(res[0])[:] = self.abandoned or self.settled or self.circling or self.late
+        self.strayed = self._looks and self.iteration % LOOK == 0 and self.program.strays(x)
+        np.frombuffer(res[0])[:] = self.abandoned or self.settled or self.circling or self.late or self.strayed
         return 0
 
     def _follow(self, x: np.ndarray, objective: float, made_up: float, infeasibility: float) -> None:

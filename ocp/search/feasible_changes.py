@@ -4,10 +4,10 @@ Nearest to the task are another duration and limits that the closest motion just
 other changes are tried, of regions, path, loads and cables: first each alone, then several together.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from functools import partial
-from typing import Any, NamedTuple
+from functools import cache, partial
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ...models.parsing import validate
 from ..audits.audit import Audit, other_tensions_may_pass
 from ..audits.excess import TENSIONS, Excess
 from ..limits.places import LOAD, PLATFORM
+from ..nlp.near import regions_near
 from ..nlp.solver import Outcome
 from ..plan import Plan
 from ..proofs.durations import durations
@@ -49,7 +50,7 @@ from .other_paths import (
 )
 from .past_regions import IN_THE_WAY, fewer_regions, past_regions
 from .refinement import rounded, solved
-from .search import OF_AUDIT, Search
+from .search import NEAR, OF_AUDIT, Search
 from .slower import LONGER, longer, longer_duration, longer_phases, other_duration, slower, slower_rate, slower_states
 
 # Of all offers [us]: one to three seconds, or half of what the plan took if that is longer, or a few audits of its
@@ -59,6 +60,9 @@ TRIES = 3  # with other limits, the motion may exceed others
 HALVINGS = 12  # of a margin
 PREFERRED = 1e-3  # of a limit's scale: an excess that costs one, so that other costs hardly matter
 BEYOND = 0.05  # of the change of a limit, more than the least, at which almost nothing is left to choose
+
+
+_Past: TypeAlias = Callable[[], list[Relaxed]]
 
 
 class Bound(NamedTuple):
@@ -141,9 +145,18 @@ def _soft_limits(search: Search) -> list[Relaxed]:
     softened = replace(with_task(scenario, limits=softer), path=scenario.path)
     if infeasible_ends(softened) is not None:  # by what is not soft
         return []
+    regions = limits.keep_out if "keep_out" in soft else ()
+    if regions:  # less than no distance is not offered, so that no softer limit helps where even that is impossible
+        touched = tuple(region.touched() for region in regions)
+        others = {name: amount for name, amount in softer.soft.items() if name != "keep_out"}
+        if infeasible_ends(with_task(scenario, limits=limits.model_copy(update={"keep_out": touched, "soft": others}))):
+            return []
     without = _without(search, soft)
     if without is None:
         return []
+    near = regions_near(scenario, without.deviation, 2 * NEAR) if regions else ()
+    if near != regions:  # a program has rows of soft ones at all of its points
+        softened = with_task(softened, limits=softer.model_copy(update={"keep_out": near}))
     for outcome, beyond in ((solved(search, softened, without.deviation), BEYOND), (without, 0.0)):
         if outcome is not None:
             lasting = scenario.lasting(outcome.duration)
@@ -238,25 +251,27 @@ def _changes(search: Search, scenario: Scenario, deviation: Deviation | None, au
     phases = longer_phases(search, scenario, audit)
     # Where the robot cannot rest at the ends, no duration and no limit helps.
     held = not chosen or scenario.task.tube.position == "free" or rests(scenario)
-    if held and (found := _near(search, scenario, deviation, audit)):
+    past = cache(partial(past_regions, search, scenario))
+    if held and (found := _near(search, scenario, deviation, audit, past)):
         return phases + found
     if scenario.count and not chosen:  # else what the platform could do exactly on its path
         audit = search.audit_motion(scenario, None, "audit of the path")
         if found := other_duration(search, scenario, durations(with_task(scenario, tube=Tube())), audit):
             return phases + found
-    return phases + _farther(search, scenario, audit)
+    return phases + _farther(search, scenario, audit, past)
 
 
-def _near(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> list[Relaxed]:
+def _near(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit, past: _Past) -> list[Relaxed]:
     """Return other durations, and looser limits, at which a motion near the closest one is feasible.
 
     If the planner chooses the motion, a longer duration is tried first where the motion is fast, and last where not.
+    `past` returns what leads past regions.
     """
     if not scenario.count:
         found = other_duration(search, scenario, search.timing.durations, audit)
         found += looser_limits(search, scenario, deviation, audit)
         return found and largest_share(search, slower_rate(scenario)) + found
-    if scenario.task.tube.position == "free" and (found := _past_what_is_in_the_way(search, scenario, audit)):
+    if scenario.task.tube.position == "free" and (found := _past_what_is_in_the_way(search, scenario, audit, past)):
         return found
     if at_ease(scenario) > scenario.duration or any(slower(excess) > 1 for excess in audit.excess):
         found = longer_duration(search, audit) + looser_limits(search, scenario, deviation, audit)
@@ -265,21 +280,21 @@ def _near(search: Search, scenario: Scenario, deviation: Deviation | None, audit
     return found or as_wide_as_states(search, scenario, audit) or slower_states(search, scenario)
 
 
-def _past_what_is_in_the_way(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
+def _past_what_is_in_the_way(search: Search, scenario: Scenario, audit: Audit, past: _Past) -> list[Relaxed]:
     """Return what leads a platform with a free position past regions, or how many of these can stay."""
-    found = past_regions(search, scenario) if _in_the_way(audit) else []
+    found = past() if _in_the_way(audit) else []
     blocking = (audit, None) if _blocked(audit) else ()
     return found or _first(search, scenario, [partial(fewer_regions, audit=each) for each in blocking])
 
 
-def _farther(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
+def _farther(search: Search, scenario: Scenario, audit: Audit, past: _Past) -> list[Relaxed]:
     """Return changes of regions, path, loads, platform and cables: each alone, or else several together.
 
-    `audit` is for the motion exactly on the path.
+    `audit` is for the motion exactly on the path, `past` returns what leads past regions.
     """
     chosen = by_programs(scenario)
-    fewer = (partial(fewer_regions, audit=audit),) * _blocked(audit)
-    found = past_regions(search, scenario) if _in_the_way(audit) else []
+    fewer = (_once(partial(fewer_regions, audit=audit)),) * _blocked(audit)
+    found = past() if _in_the_way(audit) else []
     if chosen:  # a smaller t_min alone helps where the formation does not rest
         singles = (*((smaller_t_min,) * (not rests(scenario))), *BY_PROGRAMS, *fewer, near_home)
         found = found or _first(search, scenario, singles)
@@ -318,6 +333,20 @@ def _each(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
     for make in OF_PATHS:
         found += [replace(each, detail=each.detail + with_it) for each in largest_share(search, make(scenario))]
     return found
+
+
+def _once(make: Maker) -> Maker:
+    """Return a maker that makes the change of a scenario once: limits of fewer regions take long to build."""
+    made: list[tuple[Scenario, Change | None]] = []
+
+    def change(scenario: Scenario) -> Change | None:
+        known = [each for given, each in made if given is scenario]
+        if not known:
+            known = [make(scenario)]
+            made.append((scenario, known[0]))
+        return known[0]
+
+    return change
 
 
 def _blocked(audit: Audit) -> bool:

@@ -117,8 +117,11 @@ def _other_limits_of_cables(scenario: Scenario, limit: str) -> Change | None:
 
 
 def _with_robot(scenario: Scenario, **changes: Any) -> Scenario:
-    """Return the scenario of a robot with other values of some fields, laid out for the same task."""
-    return lay_out(Robot.model_validate(scenario.robot.model_dump() | changes), scenario.task)
+    """Return the scenario of a robot with other masses or tension limits, laid out for the same task."""
+    limits = scenario.limits
+    of_points = not (limits.of_tensions or scenario.task.limits.own)  # the same for both robots
+    robot = Robot.model_validate(scenario.robot.model_dump() | changes)
+    return lay_out(robot, scenario.task, limits=limits if of_points else None)
 
 
 larger_t_max = partial(_other_limits_of_cables, limit="t_max")

@@ -241,9 +241,10 @@ def fewer_regions(scenario: Scenario, audit: Audit | None) -> Change | None:
     if len(kept) == len(given):
         return None
 
+    fewer = with_task(scenario, limits=limits.model_copy(update={"keep_out": kept}))
+
     def without(share: float) -> Variation:
-        left = given if share == 1.0 else kept
-        varied = with_task(scenario, limits=limits.model_copy(update={"keep_out": left}))
+        varied, left = (scenario, given) if share == 1.0 else (fewer, kept)
         return varied, len(left), f"of {len(given)}, without {', '.join(map(repr, sorted(through)))}"
 
     return Change("number of keep-out regions", "", without)

@@ -10,7 +10,9 @@ import numpy as np
 
 from ..audits.audit import Audit
 from ..audits.excess import TENSIONS
+from ..global_path.global_path import motion_past
 from ..limits.platform import PlatformSpeed
+from ..nlp.near import has_places
 from ..nlp.rows import Mesh
 from ..nlp.solver import Outcome
 from ..plan import Plan
@@ -33,6 +35,7 @@ LARGEST_SHARE = 0.2  # of a limit, for what one audit reports
 DIGITS = 4  # of what is offered: reports print no more
 PART = 0.8  # of the remaining effort, for one program
 LEAST_EFFORT = 1e5  # [us]: less finds nothing
+CONFIGURATIONS = 1_000, 1_500  # that are evaluated with each reserve for the start of one
 LARGE, FEWEST = 600, 20  # free coordinates at all nodes of a mesh, and its steps
 
 Shares: TypeAlias = tuple[tuple[str, str, float], ...]
@@ -198,7 +201,9 @@ def _solved_beside(
     beside = Search(scenario, {}, search.progress, scenario.task.time_limit - search.solve_s)
     beside.most_effort = PART * (search.most_effort - search.effort)
     mesh = Mesh(steps if scenario.phases.all else min(steps, max(LARGE // count, FEWEST)))
-    outcome = beside.solve("program of a relaxation", mesh, guess)
+    if guess is None and has_places(scenario):  # from a start that is clear the program takes few iterations
+        guess, _ = motion_past(beside, balance=bool(scenario.loose), most=CONFIGURATIONS)
+    outcome = beside.solve("program of a relaxation", mesh, guess, clear=guess is not None)
     yield (beside, outcome) if outcome.success else None
     search.effort += beside.effort
 

@@ -19,7 +19,7 @@ from ..nlp.linear import LinearDistances
 from ..nlp.near import Near, has_places, jumps
 from ..nlp.program import Program, build
 from ..nlp.rows import Mesh
-from ..nlp.solver import CIRCLING, MOST_ITERATIONS, SETTLED, TIME_LIMIT, Outcome, Progress, Solver
+from ..nlp.solver import CIRCLING, MOST_ITERATIONS, SETTLED, STRAYED, TIME_LIMIT, Outcome, Progress, Solver
 from ..nlp.stages import Stages
 from ..nlp.waiting import raise_if_swallowed, wait_for
 from ..plan import Plan
@@ -32,8 +32,8 @@ from .time_law import PathTiming
 
 NEAR = 0.08  # of a motion's extent: where a place is, of which a program has rows the first time
 FEW = 8  # regions
-ROUNDS = 4  # of rows that are added where a solution exceeds what the program leaves out; then it has all
-PASSES = 3  # with linear distances; more, at most as many as `ROUNDS`, where true distances are still missed
+ROUNDS = 8  # of rows that are added where a solution exceeds what the program leaves out; then it has all
+PASSES, MOST_PASSES = 3, 7  # with linear distances; more than the first where true distances are still missed
 MOST_COARSE = 150  # iterations of a program that only leads to another: those that end well take 20 to 90
 # Effort of an iteration for each unknown and row, times the root of how many there are at a node, and of an audit for
 # each of its tensions [us], on a usual processor. Measured times would make offers depend on how busy the machine is.
@@ -52,6 +52,7 @@ ENDS = {  # of a run of the solver, by its message; others are quoted
     "Infeasible_Problem_Detected": "no solution found",
     "Maximum_Iterations_Exceeded": "iteration limit reached",
     TIME_LIMIT: "time limit reached",
+    STRAYED: "stopped in a region",
     SETTLED: "stopped improving",
     CIRCLING: "went in a circle",
 }
@@ -166,13 +167,14 @@ class Search:
             reach = NEAR if coarser or (clear and crowded) else 2 * NEAR
             outcome = self._run(mesh, guess, coarser, reach)
             for added in range(ROUNDS + 1):
-                program = self._solvers[mesh].program
-                if not outcome.success or self.seconds_left <= 0 or program.suffices(outcome.deviation):
+                program, strayed = self._solvers[mesh].program, outcome.message == STRAYED
+                unsolved = not (outcome.success or strayed)
+                if unsolved or self.seconds_left <= 0 or program.suffices(outcome.deviation):
                     break
                 more = program.near.widened(self.scenario, program.shares, outcome.deviation, NEAR)
                 # From the guess again, if the solution is deep in a region: it would come out of it on any side.
-                grazes = not jumps(self.scenario, outcome.deviation)
-                near = outcome.deviation if grazes or guess is None else guess
+                grazes = not (strayed or jumps(self.scenario, outcome.deviation))
+                near = guess if strayed or not (grazes or guess is None) else outcome.deviation
                 more = more if added < ROUNDS else None
                 outcome = self._run(mesh, near, coarser and not grazes, np.inf, more)
             how = ended(outcome.message)
@@ -226,7 +228,7 @@ class Search:
             motion = motion.at(shares * motion.nodes[-1])
             near, linear = Near.along(scenario, shares, motion, 2 * NEAR), None
             best, objective, iterations, missed = None, np.inf, 0, np.inf
-            for passed in range(PASSES + ROUNDS):
+            for passed in range(MOST_PASSES):
                 if linear is None:
                     linear = wait_for(lambda near=near: LinearDistances(self._build(scenario, mesh, near)))
                 self.build_s += time.perf_counter() - start
@@ -277,7 +279,7 @@ class Search:
         built = time.perf_counter()
         at = None if guess is None else guess.at(solver.program.shares * guess.nodes[-1])
         try:
-            outcome = solver.solve(at, self._iteration, coarser, self.seconds_left)
+            outcome = solver.solve(at, self._iteration, coarser, self.seconds_left, stray=mesh.elastic)
         except BaseException:
             self._interrupted = None if mesh.elastic else solver.interrupted
             raise

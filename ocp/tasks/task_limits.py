@@ -55,6 +55,12 @@ class KeepOut(Part):
     )
     cables: Distance = 0.0
 
+    def touched(self) -> Self:
+        """Return the region without clearances, except those that are null."""
+        return self.model_copy(
+            update={name: 0.0 for name in ("platform", "carriers", "cables") if getattr(self, name) is not None}
+        )
+
     @model_serializer(mode="wrap")
     def _with_nulls(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Keep distances that are null: files leave out what is null elsewhere, and here that would be a limit."""
