@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
+from towline import Robot
 from towline.estimation.calibration import Measurements, calibrate, missing_pulleys
 
 from .framed import framed
@@ -95,6 +96,33 @@ def test_a_sound_log_shows_no_pulleys(kind):
         assert "pulleys" not in result.report()
         squares, count = surprise(result, truth)
         assert squares < chi2.ppf(0.999, count)
+
+
+def test_anchors_of_the_file_count_once_when_their_prior_is_given():
+    """Errors of the file that look like pulleys are unlikely by chance, unless such errors are said to be usual."""
+    file, log, _ = a_log("planar", 1, 0.05)
+    _, sound, truth = a_log("planar", 1, 0.0)
+    displaced = calibrate(file, log).robot.anchors - truth[:, :3]
+    anchors = truth[:, :3] - displaced + np.random.default_rng(0).normal(0, 1e-3, displaced.shape) * [1, 0, 1]
+    cables = [{**one, "anchor": at} for one, at in zip(file.model_dump()["cables"], anchors.tolist(), strict=True)]
+    file = Robot.model_validate({**file.model_dump(mode="json"), "cables": cables})
+    assert "z" in calibrate(file, sound).missing_pulleys.radii
+    assert calibrate(file, sound, prior={"anchors": 0.2}).missing_pulleys is None
+
+
+@pytest.mark.parametrize("spread", [0.01, 0.03])
+def test_pulleys_that_a_log_does_not_show_widen_its_standard_deviations(spread):
+    """Errors of the file hide pulleys: on average over robots, errors must be as large as stated, with and without."""
+    draw, shares = np.random.default_rng(7), []
+    for radius in (0.0, 0.02):
+        for seed in range(2):
+            file, log, truth = a_log("planar", seed, radius)
+            anchors = truth[:, :3] + draw.normal(0, spread, (4, 3)) * [1, 0, 1]
+            cables = zip(file.model_dump()["cables"], anchors.tolist(), strict=True)
+            data = {**file.model_dump(mode="json"), "cables": [{**one, "anchor": at} for one, at in cables]}
+            squares, count = surprise(calibrate(Robot.model_validate(data), log), truth)
+            shares.append(squares / count)
+    assert 0.05 < np.mean(shares) < 4
 
 
 def test_anchors_that_are_displaced_together_hide_no_pulleys():

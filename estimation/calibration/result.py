@@ -133,7 +133,8 @@ class CalibrationData(Displayed):
         times, worst, known = max(sigmas, default=(0.0, None, 0.0))
         if worst is not None and times > MOST_LOST:
             after, before = (quantity(1e3 * sigma, "mm", digits=2) for sigma in (worst.sigma, known))
-            return f"{worst.name} would have a standard deviation of {after}, and in the file it has {before}"
+            lacking = "" if self.missing_pulleys is None else "; the file seems to lack pulleys, which the report names"
+            return f"{worst.name} would have a standard deviation of {after}, and in the file it has {before}{lacking}"
         if far is None or abs(far.correction) <= (PLAUSIBLE if still else FARTHEST) * length:
             return None
         by, of = (quantity(size, "m", digits=3) for size in (abs(far.correction), length))
@@ -213,12 +214,16 @@ class CalibrationData(Displayed):
         It is zero along unobservable directions. It is scaled up if residuals are larger than stated or autocorrelated
         (`noise`, `autocorrelation`).
         """
-        missing = self.missing_pulleys
-        return covariance_of(self._solved) + (0.0 if missing is None else missing.covariance)
+        possible = self._possible_pulleys
+        return covariance_of(self._solved) + (0.0 if possible is None else possible.covariance)
 
-    @cached_property
+    @property
     def missing_pulleys(self) -> MissingPulleys | None:
         """Return pulleys that the cables seem to run over, but that the file lacks, or None."""
+        return self._possible_pulleys if self._possible_pulleys and self._possible_pulleys.radii else None
+
+    @cached_property
+    def _possible_pulleys(self) -> MissingPulleys | None:
         return missing_pulleys(self._solved)
 
     @cached_property
