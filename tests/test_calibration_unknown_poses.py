@@ -9,6 +9,7 @@ from towline import load
 from towline.estimation.calibration import Measurements, calibrate, read_measurements
 from towline.models import Dynamics
 
+from .framed import framed
 from .robots_as_built import NOISE, moved_anchors
 
 PRIOR = {"anchors": 0.01, "offsets": 0.05}
@@ -213,3 +214,31 @@ def test_noise_of_unmeasured_pitch_tells_nothing_of_anchors(turn):
         assert np.isfinite([one.sigma for one in known]).all() == (turn > 0)
     assert np.mean(squares) < 1.5
     assert np.sqrt(np.mean(np.square(errors))) < 0.006
+
+
+def test_offsets_that_an_ahrs_hardly_shows_stay_near_the_file():
+    """Six cables and orientations within 0.5 degrees: errors of the file are better known than most offsets."""
+    angles = np.radians([[80, 100, 200, 220, 320, 340], [40, 140, 160, 260, 280, 20]])
+    anchors, attachments = (
+        radius * np.column_stack([np.cos(around), np.sin(around), np.full(6, height)])
+        for around, radius, height in zip(angles, (3.0, 0.6), (1.2, 0.1), strict=True)
+    )
+    body = {"mass": 20.0, "inertia": [2, 2, 3, 0, 0, 0], "home": [0, 0, 1.7, 0, 0, 0]}
+    robot = framed(zip(anchors, attachments, strict=True), body)
+    before, after, surprises = [], [], []
+    for seed in range(4):
+        draw = np.random.default_rng(seed)
+        poses = robot.home + draw.uniform(-1, 1, (27, 6)) * [1.3, 1.1, 0.6, 0.12, 0.12, 0.12]
+        turned = Rotation.from_euler("xyz", poses[:, 3:])
+        ends = poses[:, None, :3] + np.einsum("nij,mj->nmi", turned.as_matrix(), attachments)
+        own = draw.normal(0, 0.02, 6)
+        readings = np.linalg.norm(ends - anchors, axis=2) - own + draw.normal(0, NOISE, (27, 6))
+        seen = (turned * Rotation.from_rotvec(draw.normal(0, np.radians(0.5), (27, 3)))).as_euler("xyz")
+        sigma = {"lengths": NOISE, "rotation": np.radians(0.5)}
+        result = calibrate(robot, Measurements(readings, orientations=seen, sigma=sigma), ["offsets"])
+        error = np.array([one.value for one in result.parameters]) - own
+        before.append((own**2).mean())
+        after.append((error**2).mean())
+        surprises.append(error @ np.linalg.solve(result.covariance, error) / 6)
+    assert np.mean(after) < np.mean(before)
+    assert np.mean(surprises) < 2.5

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import chdtr, chdtri
 
+from .considered import usual_error
 from .geometry import length_of
 from .normal_equations import metric
 from .parameters import Parameters
@@ -34,7 +35,8 @@ def loose(length: float, groups: tuple[str, ...], prior: Mapping[str, float]) ->
 def undetermined(solved: Solved) -> dict[str, float]:
     """Return loose standard deviations for the ends of cables if a fit without a prior knows ends or offsets worse.
 
-    If poses are estimated, too, this is so only if the fit went farther than that from the file.
+    If poses are estimated, too, this is so only if the fit went farther than that from the file. Without positions,
+    offsets have one, too, if they are not accurate: else offsets that hardly change any reading move all poses.
     """
     of, scale = solved.model.parameters, metric(solved.model)
     lengths = np.flatnonzero(np.array(of.units)[of.varies] == "m")
@@ -43,24 +45,29 @@ def undetermined(solved: Solved) -> dict[str, float]:
     limit, seen = min(LOOSE, LOOSE_SHARE * length) ** 2, solved.observability.covariance
     if solved.model.prior or not lengths.size or np.linalg.eigvalsh(seen[block])[-1] < NEARLY_LOOSE * limit:
         return {}
+    loosely = {}
+    if solved.model.size_is_open and "offsets" in of.groups:
+        v, change = _along_axes(solved, "offsets", solved.noise.covariance)
+        known, loosest = v < DETERMINED * (LOOSE_SHARE * length) ** 2, (LOOSE_SHARE * length) ** 2
+        # Larger offsets are no errors of a file: the winches count from elsewhere.
+        if v[-1] > usual_error(solved.model) ** 2 and (change[known] ** 2).sum() <= known.sum() * loosest:
+            loosely["offsets"] = LOOSE_SHARE * length
     values, vectors = np.linalg.eigh(solved.noise.covariance[block])
     away = ((solved.fit.state.x - of.first) * scale)[of.varies][lengths] @ vectors
     if values[-1] <= limit or (solved.model.has_unknown_poses and (away[values > limit] ** 2).sum() <= limit):
-        return {}
-    return dict.fromkeys([end for end in ENDS.values() if end in of.groups], LOOSE_SHARE * length)
+        return loosely
+    return loosely | dict.fromkeys([end for end in ENDS.values() if end in of.groups], LOOSE_SHARE * length)
 
 
 def errors_of_file(solved: Solved, prior: Mapping[str, float]) -> dict[str, float]:
     """Return the model's prior with standard deviations of the file's errors, from a fit with a `loose` prior."""
-    of, result = solved.model.parameters, dict(solved.model.prior)
-    covariance, change = covariance_of(solved), (solved.fit.state.x - of.first)[of.varies]
+    result, covariance = dict(solved.model.prior), covariance_of(solved)
     for name in set(solved.model.prior) - set(prior):
-        own = np.isin(np.flatnonzero(of.varies), np.flatnonzero(Parameters(of.robot, (name,)).varies))
-        variances, axes = np.linalg.eigh(covariance[np.ix_(own, own)])
+        variances, change = _along_axes(solved, name, covariance)
         known = variances < DETERMINED * result[name] ** 2
         if not known.any():
             continue
-        v, squares = variances[known], (change[own] @ axes[:, known]) ** 2
+        v, squares = variances[known], change[known] ** 2
         s2 = result[name] ** 2 * np.geomspace(1e-9, 1.0, 300)
         total = s2[:, None] + v
         logs = np.log(s2 * np.sqrt((total**-2).sum(axis=1))) - (np.log(total) + squares / total).sum(axis=1) / 2
@@ -68,3 +75,11 @@ def errors_of_file(solved: Solved, prior: Mapping[str, float]) -> dict[str, floa
         covered = chdtr(3, chdtri(3, 0.05) * s2[:, None] / s2) @ likely / likely.sum()
         result[name] = float(np.sqrt(np.interp(0.95, covered, s2)))
     return result
+
+
+def _along_axes(solved: Solved, group: str, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return variances of a group of parameters along principal axes, rising, and changes from the file along them."""
+    of = solved.model.parameters
+    own = np.isin(np.flatnonzero(of.varies), np.flatnonzero(Parameters(of.robot, (group,)).varies))
+    variances, axes = np.linalg.eigh(covariance[np.ix_(own, own)])
+    return variances, (solved.fit.state.x - of.first)[of.varies][own] @ axes
