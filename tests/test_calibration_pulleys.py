@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from towline import Robot
-from towline.estimation.calibration import Measurements, calibrate, missing_pulleys
+from towline.estimation.calibration import Measurements, calibrate, missing_pulleys, mistake
 
 from .framed import framed
 
@@ -130,3 +130,24 @@ def test_anchors_that_are_displaced_together_hide_no_pulleys():
     file, log, _ = a_log("planar", 1, 0.05)
     result = calibrate(file, log.changed(poses=log.poses + np.array([0.4, 0, -0.3, 0, 0, 0])))
     assert result.missing_pulleys.radii["z"] == pytest.approx(0.05, rel=0.2)
+
+
+def test_a_planar_robot_turns_about_no_other_axis():
+    """Readings over pulleys and a noisy angle agree better with no angle at all, but no convention can mean that."""
+    anchors = np.array([[0, 0, 0.75], [1, 0, 0.75], [1, 0, 0], [0, 0, 0]])
+    attachments = 0.03 * np.array([[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]])
+    body = {"mass": 8.0, "inertia": [0.1, 0.1, 0.1, 0, 0, 0], "home": [0.5, 0, 0.37, 0, 0, 0]}
+    file = framed(zip(anchors, attachments, strict=True), {**body, "dof": ["x", "z", "pitch"]})
+    draw, t, moves = np.random.default_rng(17), 0.02 * np.arange(3000), []
+    for sizes in ([0.25, 0, 0.13], [0, 0.12, 0]):
+        waves = t[:, None, None] * draw.uniform(0.3, 1.4, (3, 3)) + draw.uniform(0, 6.28, (3, 3))
+        waves = np.sin(waves).sum(axis=1)
+        moves.append(waves / np.abs(waves).max(axis=0) * sizes)
+    poses = file.home + np.hstack(moves)
+    turned = Rotation.from_euler("xyz", poses[:, 3:]).as_matrix()
+    ends = poses[:, None, :3] + np.einsum("nij,mj->nmi", turned, attachments)
+    built = anchors + draw.normal(0, 4e-3, (4, 3)) * [1, 0, 1]
+    readings = over_pulleys(built, np.array([0, 0, 1.0]), 0.02, ends) - draw.normal(0, 0.1, 4)
+    readings += draw.normal(0, 5e-4, readings.shape)
+    seen = poses + draw.normal(0, 1, poses.shape) * [5e-4, 0, 5e-4, 0, 5e-3, 0]
+    assert mistake(file, Measurements(readings, seen, times=t)) is None

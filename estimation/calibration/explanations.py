@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.text import quantity
+from ...models import points
 from .differences import LogPart, medians
 from .geometry import length_of
 from .interpretations import FACTORS, Interpretation, interpretations
@@ -21,7 +22,8 @@ CLEARLY, VERY_CLEARLY = 1.25, 2.0  # times smaller differences
 SIGNIFICANT, TOLD_APART = 6.0, 5.0  # standard deviations by which one convention of angles is likelier than another
 BY_CHANCE = 3.0  # standard deviations by which the squares of noise may exceed what was stated
 LONG_TAIL = 4.0  # median sizes; differences beyond are wrong readings
-HOPELESS = 2.0  # a convention is rejected if the roughness is so many times larger
+HOPELESS = 2.0  # a convention is rejected if roughness, or rotation about locked axes, is so many times larger
+TURNED = 1e-3  # [rad] about locked axes
 OTHER_FACTOR, SAME_FACTOR = 0.1, 0.01  # difference of a factor from 1, and from the factor of a unit
 FARTHEST = 3.0  # times the cables' mean length, of a motion
 
@@ -47,10 +49,11 @@ def explanations(log: LogPart, e: np.ndarray, noise: float) -> tuple[list[Way], 
     ways: list[Way] = []
     conventions: list[tuple[np.ndarray, Way]] = []
     tried = interpretations(bool(np.ptp(log.angles, axis=0).any()))
-    base, rough = log.parts(tried[0]), log.roughness(tried)
+    base, rough, turned_aside = log.parts(tried[0]), log.roughness(tried), _aside(log, tried[0])
     for way, own in zip(tried, rough, strict=True):
         too_far = log.carriers is None and np.ptp(way.placed(log.position), axis=0).max() > farthest
-        if (way.turned and own > HOPELESS * rough[0]) or (way.text and too_far):
+        hopeless = own > HOPELESS * rough[0] or _aside(log, way) > max(HOPELESS * turned_aside, TURNED)
+        if (way.turned and hopeless) or (way.text and too_far):
             continue
         lengths, y = log.parts(way) if way.placed is not tried[0].placed or way.turned else base
         both = np.stack([lengths[:, None] - sign * way.factor * y for sign in (1, -1)]) / way.factor
@@ -82,6 +85,12 @@ def explanations(log: LogPart, e: np.ndarray, noise: float) -> tuple[list[Way], 
         sure = root_mean_square(likeliest[0]) <= noise
         ways.append(likeliest[1]._replace(weighted=(1.0 if sure else CLEARLY) * likeliest[1].size))
     return ways, as_given
+
+
+def _aside(log: LogPart, way: Interpretation) -> float:
+    """Return by how much the platform turns about the axes about which the robot cannot turn it [rad]."""
+    turned = log.rotation if way.turned is None else way.turned(log.rotation, log.angles)
+    return float(np.ptp(points.angles(turned)[:, log.robot.dof_mask[3:] == 0], axis=0).max(initial=0.0))
 
 
 def _multiples(lengths: np.ndarray, y: np.ndarray, count: int, way: Interpretation, unseen: bool) -> list[Way]:
