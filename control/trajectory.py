@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from ..base.inputs import InputError, file_path, finite_array, number, real_array, shown
 from ..base.netcdf import Contents, load_netcdf, numbers_of
 from ..figures.scene import outlines_from
+from ..models.motion_jumps import rows_with_jumps
 from ..models.parsing import parse_yaml
 from ..models.part import LARGEST
 from ..models.rigid_load import RigidLoad
@@ -29,6 +30,7 @@ DOUBTS = {  # by the status of a plan
 GROUND = "a plan with phases on the ground, which simulations do not have: the cables bear everything"
 LITTLE = 1e-3  # of the robot's forces: less is no reaction of the ground
 SHORTEST = 1e-9  # between two samples [s]
+SHORT = 5e-4  # between two nodes of a motion [s]
 _PARTS = ("pose", "velocity", "acceleration")
 
 
@@ -126,10 +128,11 @@ def _resting(motion: Any, times: np.ndarray, end: float) -> Motion:
 
 
 def _of_samples(robot: Robot, samples: Contents) -> Trajectory:
-    """Interpolate the samples of a plan: its pieces are polynomials of time between far fewer nodes."""
+    """Interpolate the samples of a plan: its pieces are polynomials of time between far fewer nodes, and its jumps."""
     needed = (*_PARTS, *(f"carrier_{part}" for part in _PARTS), "time")
     if why := samples.attributes.get("no_reference"):
         raise InputError(f"reference must be a plan whose motion a robot can follow, got {why}")
+    rows, samples = samples, rows_with_jumps(samples)
     read = partial(numbers_of, samples, where="reference", largest=LARGEST)
     missing = [name for name in needed if samples.get(name) is None]
     if missing:
@@ -146,7 +149,7 @@ def _of_samples(robot: Robot, samples: Contents) -> Trajectory:
         np.concatenate([read(part, (n, 6))[:, None], read(f"carrier_{part}", (n, count, 6))], axis=1) for part in _PARTS
     ]
     motion[0][..., 3:] = np.unwrap(motion[0][..., 3:], axis=0)  # angles of a flight are measured, and may jump by turns
-    if n < 2 or nodes[0] < 0 or np.diff(nodes).min() < SHORTEST:
+    if n < 2 or nodes[0] < 0 or (np.diff(nodes).min() < SHORTEST and samples is rows):  # jumps have a time twice
         given = f"{n} of them from {nodes[0]:g} s to {nodes[-1]:g} s" if n else "none"
         raise InputError(f"reference must be a plan of two times or more that increase from 0 s on, got {given}")
 
@@ -158,7 +161,7 @@ def _of_samples(robot: Robot, samples: Contents) -> Trajectory:
     wind = None if air is None or robot.platform.aero is None else finite_array("reference.wind", air, (3,))
     keep_out = outlines_from(samples, "reference")
     doubt, loads = DOUBTS.get(str(samples.attributes.get("status")), ""), _loads_of(samples, read)
-    if samples.get("ground_reaction") and read("ground_reaction", (n,)).max() > LITTLE * robot.force_scale:
+    if samples.get("ground_reaction") and read("ground_reaction", (-1,)).max(initial=0.0) > LITTLE * robot.force_scale:
         doubt = "; ".join(filter(None, [doubt, GROUND]))
     planned = read("tensions", (n, m), gaps=True) if samples.get("tensions") else np.full((n, m), np.nan)
     known = np.isfinite(planned).all(axis=1)
@@ -202,7 +205,11 @@ def _interpolated(nodes: np.ndarray, parts: list[np.ndarray], times: np.ndarray)
     u, v, a, b = h * u, h * v, h * h * a, h * h * b
     # From the start of the piece on: p + u s + a s^2 / 2 + c3 s^3 + c4 s^4 + c5 s^5.
     gap, speed, bend = q - p - u - a / 2, v - u - a, b - a
-    c3, c4, c5 = 10 * gap - 4 * speed + bend / 2, -15 * gap + 7 * speed - bend, 6 * gap - 3 * speed + bend / 2
+    # In a short piece the velocities alone give c3 and c4, because differences of poses over h^2 are rounding errors.
+    short, off = h < SHORT, speed - bend / 2
+    c3 = np.where(short, off + bend / 6, 10 * gap - 4 * speed + bend / 2)
+    c4 = np.where(short, -off / 2, -15 * gap + 7 * speed - bend)
+    c5 = np.where(short, 0.0, 6 * gap - 3 * speed + bend / 2)
     pose = p + s * (u + s * (a / 2 + s * (c3 + s * (c4 + s * c5))))
     velocity = (u + s * (a + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h
     acceleration = (a + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))) / h**2

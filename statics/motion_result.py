@@ -31,7 +31,8 @@ class MotionResult(Drawn):
     def trajectory(self) -> xr.Dataset:
         """Return the motion in {G} and the tensions over time, with units as attributes.
 
-        Dimensions: time, coordinate (x, y, z, roll, pitch, yaw), carrier, cable (from 1).
+        Dimensions: time, coordinate (x, y, z, roll, pitch, yaw), carrier, cable (from 1); of plans whose acceleration
+        jumps also jump.
         """
         return self._contents.dataset()
 

@@ -18,7 +18,7 @@ import numpy as np
 from ...solvers import solve_batch
 from ..limits import Rate
 from ..limits.distance import Distance
-from ..tasks.scenario import MOST_SAMPLES
+from ..tasks.scenario import MOST_SAMPLES, Scenario
 from .checks import LENGTH_TOLERANCE
 from .instants import Instants, instants, joined
 from .tensions import tolerance_of
@@ -59,6 +59,12 @@ def between(times: np.ndarray, bent: np.ndarray) -> np.ndarray:
     return SAFETY / 8 * most * (np.diff(times) ** 2).reshape(-1, *[1] * (bent.ndim - 1))
 
 
+def law_jumps(scenario: Scenario) -> np.ndarray:
+    """Return the times at which the acceleration along a path with a time law may jump, (k,) [s]."""
+    paths = scenario.path, *scenario.carrier_paths.values()
+    return np.unique(np.concatenate([path.jumps() for path in paths]))
+
+
 def _corners(seen: Instants) -> np.ndarray:
     """Return the instants at corners of the motion, and just before its jumps, (k,).
 
@@ -68,7 +74,7 @@ def _corners(seen: Instants) -> np.ndarray:
     scenario, nodes = seen.scenario, np.zeros(0) if seen.deviation is None else seen.deviation.nodes
     paths = scenario.path, *scenario.carrier_paths.values()
     step, duration = seen.times[1] - seen.times[0], float(seen.times[-1])
-    laws = np.unique(np.concatenate([[], *(path.jumps() for path in paths)]))
+    laws = law_jumps(scenario)
     jumps = np.unique(np.concatenate([laws, scenario.phases.boundaries]))
     begin, end = np.concatenate([path.pieces(duration) for path in paths]).T
     short = end - begin < PARTS * step

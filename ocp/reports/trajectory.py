@@ -15,8 +15,11 @@ from ...figures.plan import convergence, phase_plane
 from ...figures.scene import outline_variables
 from ...figures.views import views
 from ...models.motion_file import dimensions, motion_variables, over
+from ...models.motion_jumps import SAME, with_jumps
 from ...models.parsing import to_yaml
 from ...statics.scene import scene
+from ..audits.instants import instants
+from ..audits.peaks import BESIDE, law_jumps
 from ..result import PlanData
 from ..tasks.task_limits import AnyKeepOut, Block, ConvexMesh, Sphere
 from ..tasks.wind_set import WindBox, WindDisc
@@ -32,7 +35,7 @@ INSTANTS = 60  # along the carriers' paths in the views
 def trajectory(plan: PlanData) -> Contents:
     """Return the motion and the audited tensions at the task's output rate.
 
-    Dimensions: time, coordinate, carrier, cable; of a task in phases also phase.
+    Dimensions: time, coordinate, carrier, cable; of a task in phases also phase; of a time law also jump.
     """
     robot, task = plan.scenario.robot, plan.scenario.task
     rows = output_rows(plan)
@@ -70,7 +73,26 @@ def trajectory(plan: PlanData) -> Contents:
     if task.wind is not None and not isinstance(task.wind, WindBox | WindDisc):
         attributes["wind"] = np.array(task.wind)  # [m/s] in G
     coordinates |= dimensions(robot, audit.times[rows])
-    return Contents(variables, coordinates, attributes)
+    return with_jumps(Contents(variables, coordinates, attributes), _at_jumps(plan))
+
+
+def _at_jumps(plan: PlanData) -> dict[str, Variable]:
+    """Return time, motion and tensions just before and after each jump of accelerations or loads, (2 k, ...) each."""
+    scenario = plan.scenario
+    times = np.unique(np.concatenate([law_jumps(scenario), scenario.phases.jumps]))
+    beside = BESIDE * scenario.duration
+    times = np.repeat(times[(times > beside + SAME) & (times < scenario.duration - beside - SAME)], 2)
+    if not times.size:
+        return {}
+    sides = times + beside * np.resize([-1, 1], len(times))
+    seen, (platform, carriers) = instants(scenario, plan.deviation, sides), scenario.motion(times, plan.deviation)
+    variables = motion_variables(
+        platform._replace(acceleration=seen.motion.acceleration),
+        carriers._replace(acceleration=seen.carriers.acceleration),
+    )
+    variables["tensions"] = over(("time", "cable"), seen.tensions, "N", "cable tensions")
+    variables["time"] = over(("time",), times, "s", "each jump twice: just before it and just after")
+    return variables
 
 
 def output_rows(plan: PlanData) -> np.ndarray:
