@@ -125,6 +125,27 @@ def test_pulleys_that_a_log_does_not_show_widen_its_standard_deviations(spread):
     assert 0.05 < np.mean(shares) < 4
 
 
+@pytest.mark.parametrize("kind", ["point", "box"])
+def test_pulleys_that_a_log_excludes_do_not_widen_standard_deviations(kind):
+    """Where residuals show radii of a few millimetres, a sound log is as accurate as if pulleys were known to lack."""
+    pulley = {"radius": 1e-6, "axis": [0, 0, 1]}
+    for seed in range(2):
+        file, log, _ = a_log(kind, seed, 0.0)
+        cables = [{**one, "pulley": pulley} for one in file.model_dump(mode="json")["cables"]]
+        known = Robot.model_validate({**file.model_dump(mode="json"), "cables": cables})
+        sigmas, least = ([one.sigma for one in calibrate(of, log).parameters] for of in (file, known))
+        np.testing.assert_array_less(sigmas, 1.1 * np.array(least))
+
+
+def test_limits_contain_95_percent_of_errors_with_and_without_pulleys():
+    """Errors of variance 1, of which a share has pulleys, too: few, or so many that nearly all limits are wide."""
+    draw, added = np.random.default_rng(0), np.array([0.0, 1.0, 30.0, 1e4])
+    for share in (0.01, 0.04, 0.2, 0.9):
+        errors = draw.normal(0, np.where(draw.random((400_000, 1)) < share, np.sqrt(1 + added), 1.0))
+        within = np.abs(errors) < 1.96 * np.sqrt(missing_pulleys._widened(share, added))
+        np.testing.assert_allclose(within.mean(axis=0), 0.95, atol=2e-3)
+
+
 def test_anchors_that_are_displaced_together_hide_no_pulleys():
     """Poses in a frame 0.5 m off: residuals of a planar robot hardly show a radius, but its anchors do."""
     file, log, _ = a_log("planar", 1, 0.05)

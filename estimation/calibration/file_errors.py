@@ -14,6 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import chdtr, chdtri
 
+from ..logs.measurements import measured
 from .considered import usual_error
 from .geometry import length_of
 from .normal_equations import metric
@@ -35,8 +36,8 @@ def loose(length: float, groups: tuple[str, ...], prior: Mapping[str, float]) ->
 def undetermined(solved: Solved) -> dict[str, float]:
     """Return loose standard deviations for the ends of cables if a fit without a prior knows ends or offsets worse.
 
-    If poses are estimated, too, this is so only if the fit went farther than that from the file. Without positions,
-    offsets have one, too, if they are not accurate: else offsets that hardly change any reading move all poses.
+    If poses are estimated, too, this is so only if the fit went farther than that from the file. With orientations
+    alone, offsets have one, too, if they are not accurate: else offsets that hardly change any reading move all poses.
     """
     of, scale = solved.model.parameters, metric(solved.model)
     lengths = np.flatnonzero(np.array(of.units)[of.varies] == "m")
@@ -46,7 +47,7 @@ def undetermined(solved: Solved) -> dict[str, float]:
     if solved.model.prior or not lengths.size or np.linalg.eigvalsh(seen[block])[-1] < NEARLY_LOOSE * limit:
         return {}
     loosely = {}
-    if solved.model.size_is_open and "offsets" in of.groups:
+    if solved.model.size_is_open and "offsets" in of.groups and measured(solved.model.measurements).any():
         v, change = _along_axes(solved, "offsets", solved.noise.covariance)
         known, loosest = v < DETERMINED * (LOOSE_SHARE * length) ** 2, (LOOSE_SHARE * length) ** 2
         # Larger offsets are no errors of a file: the winches count from elsewhere.

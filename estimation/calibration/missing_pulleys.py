@@ -7,9 +7,10 @@ parameters f and the radii, the fit is displaced by g r, where g = S_ff^-1 S_fr.
 from the residuals that are not absorbed, and from the anchors: with the covariance V of the fit and the variance s^2 of
 the file's errors, these differ from the file by N(g r, V + s^2), up to a rigid motion of all together.
 
-Few logs decide this: files with errors of 30 mm hide pulleys of 20 mm, which displace anchors by 50 mm. So the
-covariance includes pulleys by their probability, given the log (Bayesian model averaging), if a fifth of all files lack
-them, the usual directions of the axes are equally frequent, and so are values of log r and log s.
+Few logs decide this: files with errors of 30 mm hide pulleys of 20 mm, which displace anchors by 50 mm. So errors have
+a mixture of two distributions, by the probability of pulleys given the log (Bayesian model averaging), if a fifth of
+all files lack them, the usual directions of the axes are equally frequent, and so are values of log r and log s. The
+covariance is that of the normal distribution with the same 95 % limits.
 """
 
 from dataclasses import replace
@@ -17,6 +18,8 @@ from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import null_space
+from scipy.special import ndtr, ndtri
 
 from ...models.cable import Pulley
 from ...models.robot import Robot
@@ -28,11 +31,12 @@ from .parameters import GROUPS, Parameters
 from .solving import Solved, inflation_of
 
 LACKING = 0.2  # of the files
+OUTSIDE = 0.05  # of the errors, may be beyond the limits that a covariance means
 LIKELY = 0.9  # probability, below which there may be no pulleys
 ALSO = 0.02  # times the probability of the likeliest direction of the axes
 RADII = np.geomspace(1e-3, 0.05, 60)  # of the cables' length
 ERRORS = np.geomspace(1e-4, 0.1, 100)  # of the file's anchors, relative to the cables' length
-TINY = 1e-6  # [m], radius at which derivatives by the radius are those of a point
+TINY = 1e-10  # [m], radius at which derivatives by the radius are those of a point
 OBSERVABLE = 1e-6  # of the largest variance, or of the longest common motion
 GAUGES = 6  # rigid motions of all anchors
 MOST_SAMPLES = 6000
@@ -44,10 +48,12 @@ class MissingPulleys(NamedTuple):
     Attributes:
         radii: Expected radii [m], by the directions of the swivel axes that are likely; empty if there may be none.
         covariance: Covariance that pulleys add to the parameters, in their order and units, (p, p).
+        information: As in `Noise`, (p, p), with this covariance.
     """
 
     radii: dict[str, float]
     covariance: np.ndarray
+    information: np.ndarray
 
 
 def missing_pulleys(solved: Solved) -> MissingPulleys | None:
@@ -64,16 +70,31 @@ def missing_pulleys(solved: Solved) -> MissingPulleys | None:
     logs = np.array([log for log, *_ in found.values()])
     logs += np.log(LACKING / (1 - LACKING) / len(found))
     shares = np.exp(logs - np.logaddexp(0.0, np.logaddexp.reduce(logs)))
-    scale, likely = metric(of)[of.parameters.varies], shares.sum() > LIKELY
-    radii: dict[str, float] = {}
-    covariance = np.zeros((len(scale), len(scale)))
-    for k in np.argsort(-shares):
-        text, (_, mean, square, moved) = list(found.items())[k]
-        root = np.sqrt(shares[k] * square) * moved / scale[:, None]
-        covariance += root @ root.T
-        if likely and shares[k] > ALSO * shares.max():
-            radii[text] = mean
-    return MissingPulleys(radii, covariance)
+    share, radii = float(shares.sum()), dict[str, float]()
+    for k in np.argsort(-shares) if share > LIKELY else ():
+        if shares[k] > ALSO * shares.max():
+            text, (_, radii[text], _) = list(found.items())[k]
+    roots = np.hstack([np.sqrt(own / share) * root for own, (_, _, root) in zip(shares, found.values(), strict=True)])
+    values, axes = np.linalg.eigh(solved.noise.covariance)
+    axes = (axes * np.sqrt(np.maximum(values, 0.0)))[:, len(values) - solved.observability.rank :]
+    values, turn = np.linalg.eigh(np.linalg.pinv(axes) @ roots @ roots.T @ np.linalg.pinv(axes).T)
+    root = axes @ turn * np.sqrt(_widened(share, np.maximum(values, 0.0)) - 1)
+    known = solved.noise.information @ root
+    information = solved.noise.information - known @ np.linalg.solve(np.eye(root.shape[1]) + root.T @ known, known.T)
+    root /= metric(of)[of.parameters.varies, None]
+    return MissingPulleys(radii, root @ root.T, information)
+
+
+def _widened(share: float, added: np.ndarray) -> np.ndarray:
+    """Return variances of normal distributions with the 95 % limits of mixtures.
+
+    These have the variance 1, and a `share` of them that of pulleys `added`, (n,).
+    """
+    wide = np.sqrt(1 + added)
+    limits = np.geomspace(1.0, wide, 400) * ndtri(1 - OUTSIDE / 2)
+    outside = 2 * (1 - share) * ndtr(-limits) + 2 * share * ndtr(-limits / wide)
+    found = [np.interp(-OUTSIDE, -one, limit) for one, limit in zip(outside.T, limits.T, strict=True)]
+    return (np.array(found) / ndtri(1 - OUTSIDE / 2)) ** 2
 
 
 def _with_pulleys(robot: Robot) -> dict[str, Robot]:
@@ -93,11 +114,11 @@ def _with_pulleys(robot: Robot) -> dict[str, Robot]:
     return dict(found.values())
 
 
-def _evidence(solved: Solved, of: Model, state: State, robot: Robot) -> tuple[float, float, float, np.ndarray]:
+def _evidence(solved: Solved, of: Model, state: State, robot: Robot) -> tuple[float, float, np.ndarray]:
     """Return what a log says about pulleys with some axes.
 
-    These are the logarithm of the ratio of likelihoods, the expected radius [m] and its expected square, and g for each
-    cable's radius, (p, m).
+    These are the logarithm of the ratio of likelihoods, the expected radius [m], and a root (p, m) of the covariance
+    that such pulleys add.
     """
     seen, noise = solved.observability, inflation_of(solved.noise)
     groups = tuple(name for name in GROUPS if name in (*of.parameters.groups, "radii"))
@@ -110,7 +131,8 @@ def _evidence(solved: Solved, of: Model, state: State, robot: Robot) -> tuple[fl
     S, across = equations.S[np.ix_(free, free)], equations.S[np.ix_(free, ~free)]
     inverse = axes @ np.linalg.inv(axes.T @ S @ axes) @ axes.T
     moved = inverse @ across
-    information = float((equations.S[np.ix_(~free, ~free)] - across.T @ moved).sum()) / noise
+    each = (equations.S[np.ix_(~free, ~free)] - across.T @ moved) / noise
+    information = float(each.sum())
     toward = -float((equations.b[~free] - moved.T @ equations.b[free]).sum()) / noise
     # The file's anchors, without motions of all together; a prior has made them a part of the fit already.
     own = Parameters(of.robot, ("anchors",)).varies
@@ -131,4 +153,9 @@ def _evidence(solved: Solved, of: Model, state: State, robot: Robot) -> tuple[fl
     likelihoods = np.exp(logs - logs.max()).sum(axis=1)
     ratio = logs.max() - without.max() + np.log(likelihoods.mean() / np.exp(without - without.max()).sum())
     expected = likelihoods / likelihoods.sum()
-    return float(ratio), float(expected @ radii), float(expected @ radii**2), moved
+    # Radii and axes of single cables differ by as much as the residuals allow.
+    square, others = float(expected @ radii**2), np.asarray(null_space(np.ones((1, len(each)))))
+    values, turn = np.linalg.eigh(others.T @ each @ others)
+    differences = others @ turn / np.sqrt(np.maximum(values, 0.0) + 1 / square)
+    root = np.column_stack([np.full(len(each), np.sqrt(square)), differences])
+    return float(ratio), float(expected @ radii), moved @ root

@@ -226,7 +226,7 @@ def normal_rows(parameters: Parameters) -> np.ndarray:
         if robot.dof_mask[across].any():
             continue
         of_platform = points.rotations(robot.home[None, 3:])[0].T @ unit
-        for i in np.flatnonzero((np.abs(apart[:, axis]) < IN_PLANE) & (robot.pulley_radii == 0)):
+        for i in np.flatnonzero((np.abs(apart[:, axis]) < IN_PLANE) & (robot.pulley_radii < IN_PLANE)):
             for first, end in ((0, turned[i].T @ unit), (3, of_platform)):
                 row = np.zeros(parameters.count)
                 parameters.table(row)[i, first : first + 3] = end

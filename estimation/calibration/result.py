@@ -232,7 +232,7 @@ class CalibrationData(Displayed):
 
         It is the pseudo-inverse of the covariance, factors `noise` and `autocorrelation` included.
         """
-        return self._noise.information
+        return self._possible_pulleys.information if self._possible_pulleys else self._noise.information
 
     @property
     def _noise(self) -> Noise:
