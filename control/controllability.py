@@ -1,4 +1,4 @@
-"""`uncontrolled`: wrench directions that neither tensions nor carriers can change; `is_underactuated`."""
+"""`uncontrolled`: wrench directions that neither tensions nor carriers change; `is_underactuated`, `needs_carriers`."""
 
 import numpy as np
 
@@ -17,8 +17,14 @@ def is_underactuated(robot: Robot) -> bool:
     This is so with fewer cables, and for a load below six flying carriers whose cables all point to its axis: nothing
     turns it about this axis unless carriers move. Cables with winches are taken to control as many as there are cables.
     """
+    few = robot.m < len(robot.platform.dof)
+    return few or (robot.fixed_lengths is not None and needs_carriers(robot))
+
+
+def needs_carriers(robot: Robot) -> bool:
+    """Return whether the platform has freedoms at home that tensions hardly control, but carriers that move do."""
     count = len(robot.platform.dof)
-    if robot.m < count or robot.fixed_lengths is None:
+    if robot.m < count or all(carrier.kind == "ground" for carrier in robot.carriers):
         return robot.m < count
     scale = robot.wrench_scale * robot.dof_mask
     sizes = np.linalg.svd(scale[:, None] * dynamics_of(robot).wrench_matrix(robot.home, robot.carrier_home))[1]

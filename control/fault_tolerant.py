@@ -17,12 +17,16 @@ from ..statics.formation import formation
 from .as_floats import as_floats
 from .controller import Command, Controller, Reference, State
 from .predictive import Predictive
+from .stability import PERIOD, closed_loop
 from .watch import HandOver, lost_carrier
 
 BLENDED = 1.0  # [s], in which the others go to their new formation
 APART = 0.01  # [s], of references that are announced
 SETTLED = 3.0  # [s], from which their motion is as predicted again
 ROOM = 0.2  # of the cables' length: reach of the others, which have to move far
+STEEP = 0.2  # [rad]: into the nearest formation with a smaller tilt, a team moves in balance
+LEVELS = 1.0, 10.0, 30.0, 80.0  # weights of the tilt in a formation, tried in turn
+NEAR = 0.05  # of the robot's length, and of it in a second: where and how fast a platform is that has come to rest
 
 
 def _orders(*coefficients: float) -> list[np.polynomial.Polynomial]:
@@ -65,7 +69,9 @@ class FaultTolerant(Controller):
     weight and its cables. Its cables are then released (`Command.released`), and the others take 1 s to reach a
     formation in which they carry the platform at the planned position. Formations and controllers are computed at
     construction for the loss of each carrier, see `statics.formation`. If there is none, a warning gives the missing
-    wrench, and nothing changes when that carrier is lost.
+    wrench, and nothing changes when that carrier is lost. If the platform tilts in a formation, the loss is simulated
+    at home, where the load may fall faster than the others can lean their cables. Formations with less tilt are then
+    tried, and if the others reach none of them, a warning says so, and nothing changes either.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file, with flying carriers alone and
@@ -89,8 +95,32 @@ class FaultTolerant(Controller):
             reason = f"the carrier {other[0]!r}, which does not fly" if other else "winches"
             raise InputError(f"robot must be a team of flying carriers with cables of fixed length, got {reason}")
         self._team = Predictive(self.robot, **options)
-        self._rests = [_without(self.robot, index, options) for index in range(len(self.robot.carriers))]
+        self._rests: list[Rest | None] = [None] * len(self.robot.carriers)
         self.reset()
+        for index in range(len(self._rests)):
+            self._prepare(index, options)
+
+    def _prepare(self, index: int, options: dict[str, Any]) -> None:
+        """Find a formation of the others that they reach, the nearest one or one with less tilt, or warn."""
+        for level in LEVELS:
+            self._rests[index] = rest = _without(self.robot, index, options, level)
+            if rest is None or (level == LEVELS[0] and np.linalg.norm(rest.tilt) < STEEP) or self._settles(index):
+                return
+        self._rests[index] = None
+        known = "a formation exists, but the platform tilts too fast for the others to reach it"
+        warn(f"{self.robot.name} loses its load without {self.robot.carriers[index].name}: {known}", stacklevel=3)
+
+    def _settles(self, index: int) -> bool:
+        """Return whether the others bring the platform to rest where it was, after a loss at rest at home."""
+        size, home, still = self.robot.length, self.robot.home, 0.0
+        for k, (now, _) in enumerate(closed_loop(self, self.robot, self._team._statics, lost=index)):
+            off = float(np.linalg.norm(now.pose[:3] - home[:3]))
+            rate = float(np.linalg.norm(now.velocity * np.repeat([1.0, size], 3)))
+            still = still + PERIOD if k * PERIOD > BLENDED and max(off, rate) < NEAR * size else 0.0
+            if still > BLENDED / 2 or not off < size:
+                break
+        self.reset()
+        return still > 0.0
 
     @override
     def reset(self) -> None:
@@ -196,7 +226,7 @@ class FaultTolerant(Controller):
         return given._replace(**changes, released=~np.isin(np.arange(self.robot.m), rest.cables))
 
 
-def _without(robot: Robot, index: int, options: dict[str, Any]) -> Rest | None:
+def _without(robot: Robot, index: int, options: dict[str, Any], level: float) -> Rest | None:
     """Return the team without a carrier and its cables; None, with a warning, if it cannot carry the platform."""
     data, lengths = robot.model_dump(), robot.fixed_lengths
     assert lengths is not None
@@ -207,11 +237,11 @@ def _without(robot: Robot, index: int, options: dict[str, Any]) -> Rest | None:
     if len(carriers) == 0:
         return None
     home, name = robot.home, robot.carriers[index].name
-    found = formation(Robot.model_validate(data), home, robot.carrier_home[carriers], lengths[cables])
+    found = formation(Robot.model_validate(data), home, robot.carrier_home[carriers], lengths[cables], level)
     if not found.exists:
         force, moment = quantity_row(found.missing[:3], "N"), quantity_row(found.missing[3:], "N m")
         lacks = f"a force of {force} and a moment of {moment} about the CoM are missing"
-        warn(f"{robot.name} cannot rest without {name}: {lacks}", stacklevel=3)
+        warn(f"{robot.name} cannot rest without {name}: {lacks}", stacklevel=4)
         return None
     data["platform"]["home"] = found.pose.tolist()
     for carrier, pose in zip(data["carriers"], found.carrier_pose.tolist(), strict=True):

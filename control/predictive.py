@@ -19,7 +19,7 @@ from .as_floats import ROUNDING, as_floats
 from .bandwidths import CASCADE, PATIENT, STILL, TEAM, TOWING, bandwidths_for, noise_of_change
 from .carrier_references import moved_coordinates
 from .computed_torque import ComputedTorque
-from .controllability import is_underactuated
+from .controllability import needs_carriers
 from .controller import HOLD, OTHERWISE, SHIFTED, SOFT, Command, Reference, State
 from .keep_out import Surroundings
 from .noise import Noise
@@ -63,9 +63,10 @@ class Predictive(ComputedTorque):
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
         bandwidth: Closed-loop bandwidth [rad/s] away from limits, a number or one for each coordinate of the pose.
-            Default: 40, but less if carriers correct errors, as they do with cables of fixed length or with fewer
-            cables than degrees of freedom: 8 for teams with cables of fixed length, 6 for towing robots with winches.
-            Limited to 1.2 / `stage`, or 0.45 / `stage` if carriers correct errors.
+            Default: 40, but less if carriers correct errors, as they do with cables of fixed length, with fewer cables
+            than degrees of freedom, or if they can move and their cables hardly turn the platform: 8 for teams with
+            cables of fixed length, 6 for towing robots with winches. Limited to 1.2 / `stage`, or 0.45 / `stage` if
+            carriers correct errors.
         stages, stage: Number of stages, and duration of each [s]. Default: 20 of 0.015 s; of 0.03 s if carriers may
             leave their reference, because they are slower; of 0.025 s if carriers correct errors. In slow loops, stages
             become as long as the steps, at most 0.21 s. A loop is slow if both the period given to `follow` and the
@@ -119,7 +120,7 @@ class Predictive(ComputedTorque):
         sensors: Noise | Mapping[str, Any] | None = None,
     ):
         the_robot = as_robot(robot)
-        correct = the_robot.fixed_lengths is not None or is_underactuated(the_robot)
+        correct = the_robot.fixed_lengths is not None or needs_carriers(the_robot)
         if (given := reach) is None:
             lengths = np.linalg.norm(the_robot.home_anchors - the_robot.home_attachments, axis=1)
             reach = (USUAL_REACH * float(lengths.mean()) if correct else 0.0, 0.0)

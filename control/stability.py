@@ -1,16 +1,17 @@
-"""`grows`: whether small errors at home grow in the whole closed loop."""
+"""`grows`: whether small errors at home grow in the whole closed loop; `closed_loop`: its motion, step by step."""
 
 import hashlib
 import pickle
 from collections import deque
+from collections.abc import Iterator
 
 import numpy as np
 
 from ..models.robot import Robot
-from ..plant import Plant
+from ..plant import Plant, Reading
 from ..solvers import TensionSolution
 from .computed_torque import ComputedTorque
-from .controller import OTHERWISE, Reference, State
+from .controller import OTHERWISE, Command, Controller, Reference, State
 from .lag import Lag
 
 PERIOD = 2e-3  # [s] between steps
@@ -56,30 +57,14 @@ def grows(
 def _simulated(
     controller: ComputedTorque, robot: Robot, tensions: np.ndarray, bandwidth: float, age: float, lag: float
 ) -> bool:
-    plant = Plant(robot, drive="tensions" if robot.fixed_lengths is None else "lengths")
-    still = np.zeros_like(robot.carrier_home)
-    reference = Reference(robot.home, np.zeros(6), np.zeros(6), robot.carrier_home, still, still, tensions)
     scale = np.repeat([1.0, robot.length], 3) * robot.dof_mask
     push = np.random.default_rng(0).normal(size=6)
     push -= push @ controller.uncontrolled.T @ controller.uncontrolled  # a load that spins below a cable is let alone
     push *= PUSH * robot.force_scale * scale
-    state = plant.start(tensions=tensions)
     steps = int(np.clip(SLOW / max(bandwidth, SLOWEST) / PERIOD, LEAST, MOST))
-    sizes, pulls, drives = np.zeros(MOST), tensions, Lag(lag)
-    late = deque([State(robot.home, np.zeros(6), robot.carrier_home, still, tensions)] * round(age / PERIOD))
-    controller.reset()
-    grown = False
-    for k in range(MOST):
-        now = plant.read(state)
-        late.append(State(now.pose, now.velocity, now.carrier_pose, now.carrier_velocity, pulls))
+    sizes, grown = np.zeros(MOST), False
+    for k, (now, command) in enumerate(closed_loop(controller, robot, tensions, push, age, lag)):
         off, sizes[k] = np.linalg.norm(scale * (now.pose - robot.home)), np.linalg.norm(scale * now.velocity)
-        command = controller.step(PERIOD * k, late.popleft(), reference)
-        cables = command.tensions if robot.fixed_lengths is None else robot.fixed_lengths
-        wrench = push if PERIOD * k < PUSHED else None
-        given = None if command.actuation is None else drives.follow(command.actuation, PERIOD)
-        row = plant.command(cables, given, *command[1:4], wrench=wrench)
-        run = plant.run(state, row[None], PERIOD)
-        state, pulls = run.states[-1], run.tensions.mean(axis=0)
         if not off < FAR * robot.length or command.answered == OTHERWISE:
             grown = True
             break
@@ -91,3 +76,43 @@ def _simulated(
             steps += MORE_STEPS
     controller.reset()
     return bool(grown)
+
+
+def closed_loop(
+    controller: Controller,
+    robot: Robot,
+    tensions: np.ndarray,
+    push: np.ndarray | None = None,
+    age: float = 0.0,
+    lag: float = 0.0,
+    lost: int | None = None,
+) -> Iterator[tuple[Reading, Command]]:
+    """Close the loop around a `Plant` at rest at home, and yield what is read and commanded in each of `MOST` steps.
+
+    - `tensions`: tensions at home, (m,) [N].
+    - `push`: wrench on the platform during the first `PUSHED` [N, N m], (6,); default: none.
+    - `age`, `lag`: age of the states, and time constant of actuators [s].
+    - `lost`: index of a carrier whose actuators give nothing; default: none.
+    """
+    plant = Plant(robot, drive="tensions" if robot.fixed_lengths is None else "lengths")
+    still = np.zeros_like(robot.carrier_home)
+    reference = Reference(robot.home, np.zeros(6), np.zeros(6), robot.carrier_home, still, still, tensions)
+    state, pulls, drives, held = plant.start(tensions=tensions), tensions, Lag(lag), np.ones(robot.m, dtype=bool)
+    late = deque([State(robot.home, np.zeros(6), robot.carrier_home, still, tensions)] * round(age / PERIOD))
+    controller.reset()
+    controller.follow([reference, reference], PERIOD)
+    for k in range(MOST):
+        now = plant.read(state)
+        late.append(State(now.pose, now.velocity, now.carrier_pose, now.carrier_velocity, pulls))
+        command = controller.step(PERIOD * k, late.popleft(), reference)
+        yield now, command
+        if command.released is not None:
+            for cable in np.flatnonzero(held & command.released):
+                state, held[cable] = plant.cut(state, int(cable)), False
+        cables = command.tensions if robot.fixed_lengths is None else robot.fixed_lengths
+        given = None if command.actuation is None else drives.follow(command.actuation, PERIOD)
+        if given is not None and lost is not None:
+            given[lost] = 0.0
+        wrench = push if PERIOD * k < PUSHED else None
+        run = plant.run(state, plant.command(cables, given, *command[1:4], wrench=wrench)[None], PERIOD)
+        state, pulls = run.states[-1], run.tensions.mean(axis=0)

@@ -11,7 +11,7 @@ from ..models.record import record_of
 from ..models.robot import Robot
 from ..statics.distribution import tensions
 from .carrier_references import Moved
-from .controllability import is_underactuated
+from .controllability import needs_carriers
 from .settings import Limits
 
 SHARE = 0.05  # of the robot's scale of forces: the tension that costs as much as a carrier at the end of its reach
@@ -46,7 +46,7 @@ def weights(
     """
     A, M = _at_home(robot)
     far = (SHARE * robot.force_scale / reach) ** 2
-    if is_underactuated(robot):
+    if needs_carriers(robot):
         A = np.concatenate([A, M @ moved / np.sqrt(far)], axis=1)
     U, sizes, _ = np.linalg.svd(A)
     sizes = np.concatenate([sizes, np.zeros(6)])[:6]

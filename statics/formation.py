@@ -4,7 +4,7 @@ The unknowns are roll and pitch of the platform, up to 0.6 rad, poses of the car
 They balance all weights inside the limits of tensions and efforts, with cables of their lengths, and differ little from
 where they are:
 
-    min   sum of |p_i - p_i0|^2 + (length of the robot)^2 |tilt - tilt0|^2
+    min   sum of |p_i - p_i0|^2 + level (length of the robot)^2 |tilt - tilt0|^2
     s.t.  A t + m g = 0,   l_i = L_i,   efforts of carriers and tensions inside their limits
 """
 
@@ -46,13 +46,16 @@ class Formation(NamedTuple):
         return not self.missing.any()
 
 
-def formation(robot: Robot, pose: np.ndarray, carrier_pose: np.ndarray, lengths: np.ndarray) -> Formation:
+def formation(
+    robot: Robot, pose: np.ndarray, carrier_pose: np.ndarray, lengths: np.ndarray, level: float = 1.0
+) -> Formation:
     """Return the formation nearest to a pose (6,) and carriers (c, 6) [m, rad], with cables of `lengths`, (m,) [m].
 
-    If none is found, it is the one that misses the smallest part of the wrench.
+    With a larger `level` the platform tilts less, and carriers are further away. If none is found, it is the one that
+    misses the smallest part of the wrench.
     """
     for most in (0.0, np.inf):  # of the missing wrench
-        if (found := _solved(robot, pose, carrier_pose, lengths, most)) is not None:
+        if (found := _solved(robot, pose, carrier_pose, lengths, level, most)) is not None:
             return found
     weight = np.append(robot.platform.mass * np.array(robot.gravity), np.zeros(3))
     return Formation(pose, carrier_pose, np.zeros(robot.m), -weight)
@@ -66,7 +69,9 @@ class _Row(NamedTuple):
     high: float | np.ndarray = 0.0
 
 
-def _solved(robot: Robot, pose: np.ndarray, carriers: np.ndarray, lengths: np.ndarray, most: float) -> Formation | None:
+def _solved(
+    robot: Robot, pose: np.ndarray, carriers: np.ndarray, lengths: np.ndarray, level: float, most: float
+) -> Formation | None:
     """Return the nearest formation that misses up to `most` in a row, as a part of the force scale, or None."""
     c, m = len(robot.carriers), robot.m
     tilt, moved = ca.SX.sym("tilt", 2), ca.SX.sym("moved", 5, c)  # moved: x, y, z, roll and pitch of the carriers
@@ -74,7 +79,7 @@ def _solved(robot: Robot, pose: np.ndarray, carriers: np.ndarray, lengths: np.nd
     at, placed = ca.vertcat(pose[:3], tilt, pose[5]), ca.vertcat(moved, ca.DM(carriers[:, 5]).T).T  # (c, 6)
     run = kinematics.cables(robot, at, kinematics.anchors(robot, placed), kinematics.axes(robot, placed))
     rows = [*_at_rest(robot, at, run, t, missing, lengths), *_inside_efforts(robot, placed, run, t)]
-    cost = ca.sumsqr(moved[:3, :] - ca.DM(carriers[:, :3]).T) + robot.length**2 * ca.sumsqr(tilt - pose[3:5])
+    cost = ca.sumsqr(moved[:3, :] - ca.DM(carriers[:, :3]).T) + level * robot.length**2 * ca.sumsqr(tilt - pose[3:5])
     cost += PENALTY * robot.length**2 * ca.sumsqr(missing)
     unknowns, values = ca.vertcat(tilt, ca.vec(moved), t, missing), ca.vertcat(*(row.value for row in rows))
     solver = ca.nlpsol("formation", "ipopt", {"x": unknowns, "f": cost, "g": values}, OPTIONS)

@@ -106,6 +106,42 @@ def test_the_others_carry_the_load_to_rest(prepared):
     assert run.answered["not as modelled"] == 0
 
 
+def kite(turned):
+    """Four carriers, the second and fourth turned by an angle towards the first: the CoM is beyond all but the third.
+
+    Newton's equations at rest: tensions balance along both axes if those of first and third differ by the angle's sine.
+    """
+    data, tan, height = load("multi-quadrotor-4").model_dump(mode="json"), 0.4, 1.2
+    angles = np.array([0.0, np.pi / 2 - turned, np.pi, 3 * np.pi / 2 + turned])
+    pulls = data["platform"]["mass"] * 9.81 / 4 * (1 + np.sin(turned) * np.array([-1, 0, 1, 0]))
+    for carrier, cable, angle, pull in zip(data["carriers"], data["cables"], angles, pulls, strict=True):
+        x, y = np.cos(angle), np.sin(angle)
+        force = np.array([tan * pull * x, tan * pull * y, pull + carrier["mass"] * 9.81])
+        lean = [-np.arcsin(force[1] / np.linalg.norm(force)), np.arctan2(force[0], force[2]), 0.0]
+        far = 0.3 + tan * height
+        carrier["home"] = [far * x, far * y, 0.03 + height, *lean]
+        cable |= {"attachment": [0.3 * x, 0.3 * y, 0.03], "length": height * float(np.hypot(1, tan))}
+    data["platform"]["home"] = [0.0] * 6
+    return Robot.model_validate(data)
+
+
+def test_a_formation_that_is_not_reached_is_refused_at_construction(monkeypatch):
+    """Without the third carrier the load tips over before the others can lean their cables: it was 3 m off."""
+    robot, usual = kite(0.2), fault_tolerant._without
+    monkeypatch.setattr(fault_tolerant, "_without", lambda *given: usual(*given) if given[1] == 2 else None)
+    with pytest.warns(UserWarning, match="multi-quadrotor-4 loses its load without quad3: a formation exists"):
+        controller = FaultTolerant(robot)
+    monkeypatch.setattr(FaultTolerant, "_settles", lambda *_: True)
+    tried = FaultTolerant(robot)
+    given = {"duration": 2.0, "period": 2e-3, "events": ["lose quad3 at 0.1"], "tolerance": 0.2}
+    run = simulate(robot, robot.home, tried, **given)
+    assert run.record.released.any()
+    assert run.error.max() > 0.5
+    run = simulate(robot, robot.home, controller, **given | {"duration": 0.2})
+    assert controller.lost.reason == "quad3 has lost its thrust: the others cannot carry the platform"
+    assert not run.record.released.any()
+
+
 def test_a_moving_load_on_another_plant_is_carried_on(prepared):
     """In MuJoCo, in gusts, at up to 1.1 m/s: the plan goes on with the others."""
     pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")

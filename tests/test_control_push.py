@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from towline.control import ComputedTorque, Predictive, Reference
-from towline.models import load
+from towline.models import Robot, load
 from towline.simulation import simulate
 
 from .slung_load import MASS, slung
@@ -67,3 +67,21 @@ def test_a_quadrotor_that_was_turned_far_stops_turning_in_time_with_late_rotors(
     assert 0.01 < max(off) < 0.045  # 0.15 m and growing with a rate of h e / 2 for each e
     assert controller._platform["attitude"][0] == 40
     assert off[-1] < 0.9 * max(off)
+
+
+def test_a_load_whose_six_cables_nearly_meet_at_its_axis_is_turned_by_its_carriers():
+    """Cables turned it about this axis with all their strength, and predictive control was 1.2 m off in this push."""
+    data, rng = load("wang-ctmrts-6").model_dump(mode="json"), np.random.default_rng(5)
+    for carrier in data["carriers"]:
+        for k in range(2):
+            carrier["home"][k] += 0.05 * load("wang-ctmrts-6").length * rng.uniform(-1, 1)
+    robot = Robot.model_validate(data)
+    push = f"push {0.05 * robot.weight} {-0.03 * robot.weight} 0 at 0.2 for 0.3"
+    errors = []
+    for controller in (Predictive(robot), ComputedTorque(robot)):
+        run = simulate(robot, robot.home, controller, events=[push], duration=1.2, period=0.002)
+        errors.append(run.error.max())
+        if isinstance(controller, Predictive):
+            assert run.answered["as planned"] == len(run.error)
+            assert run.record.tensions.max() < 0.6 * robot.weight  # 0.2 at rest, and once 5
+    assert errors[0] < errors[1] < 0.02
