@@ -1,4 +1,4 @@
-"""`Parameters`, `modelled`, `lags_of`: the robot of a replay, its drives, and what may be wrong in its file."""
+"""`Parameters`, `modelled`: the robot of a replay, its drives and load cells, and what its file may have wrong."""
 
 from typing import Any, NamedTuple
 
@@ -72,14 +72,27 @@ def changed(robot: Robot, to: Parameters) -> Robot:
     return robot.model_copy(update={"cables": tuple(cables), "platform": platform, "gravity": tuple(gravity)})
 
 
-def lags_of(robot: Robot) -> np.ndarray:
-    """Return the lag with which drives that know their winch give tensions, (m,) [s], see core/plant/winch_forces.h.
+def cells_of(to: Parameters, usual: float) -> np.ndarray:
+    """Return readings per newton and readings without tension of load cells, (2, m); `usual` is the usual tension."""
+    gains, zeros = np.reshape(to.load_cells, (2, -1))
+    return np.array([1 + gains, zeros * usual])
 
-    Tensions of cables that do not stretch are given at once.
+
+def given_by_drives(robot: Robot, commands: np.ndarray, dt: float) -> np.ndarray:
+    """Return the tensions that drives give for commands (W, K, m) every `dt` [s], constant before the first [N].
+
+    The response of drives that know their winch is linear, see core/plant/winch_forces.h: with the elongation e,
+    J e'' + (P C + D) e' + P K e = P t*, t = K e + C e'. Tensions of cables that do not stretch are given at once.
     """
-    lags, lengths = np.zeros(robot.m), np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1)
+    from scipy.signal import cont2discrete, lfilter, lfilter_zi
+
+    given, lengths = commands.copy(), np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1)
     for i, cable in enumerate(robot.cables):
-        if cable.winch and cable.stiffness:
-            K = cable.stiffness / lengths[i]
-            lags[i] = 2 / max(QUICK, np.sqrt(K / cable.winch.inertia)) - (cable.damping or 0.0) / K
-    return lags.clip(0.0)
+        if cable.winch and cable.winch.inertia and cable.stiffness:
+            J, K, C = cable.winch.inertia, cable.stiffness / lengths[i], cable.damping or 0.0
+            P = max(QUICK**2 * J / K if C == 0 else min(QUICK**2 * J / K, 2 * QUICK * J / C), 1.0)
+            D = max(2 * np.sqrt(P * K * J) - P * C, 0.0)
+            (b,), a, _ = cont2discrete(([C, K], [J / P, C + D / P, K]), dt, "foh")
+            start = lfilter_zi(b, a) * commands[:, :1, i]
+            given[..., i] = lfilter(b, a, commands[..., i], axis=1, zi=start)[0]
+    return given.clip(0.0)

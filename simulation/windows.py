@@ -20,13 +20,13 @@ from ..models.dynamics import dynamics_of
 from ..plant import Plant, layout
 from ..plant.reading import sensed
 from ..plant.steps import Periods, steps_in
-from .replayed_robot import Parameters, changed, friction_of, lags_of, modelled
+from .replayed_robot import Parameters, cells_of, changed, friction_of, given_by_drives, modelled
+from .start_tensions import SLOW, StartTensions
 
 STEP = 2e-3  # [s] of the simulation
 MARGIN = 0.05  # [s] of a recording before its first window, and longest gap that is none
 MOST_WINDOWS, MOST_SAMPLES = 80, 40  # of a recording, evenly spread, and of a window
 FEWEST = 5  # samples of a window
-SLOW = 0.01  # [m/s] of a cable, below which friction is less than its value at higher speeds
 NUDGE = 1e-4, 1e-3  # [m, rad] and [m/s, rad/s], by which starts are varied
 SLOPE = 8.0  # deviation of a smoothed slope, about twice that of white noise, over noise / (n^1.5 dt)
 FLOOR = {"position": 2e-5, "rotation": 2e-5, "tensions": 1e-2, "lengths": 1e-5}  # of noise
@@ -102,15 +102,13 @@ class Windows:
         """Choose what is commanded, and by which numbers."""
         of, robot = self.recorded, self.recorded.robot
         kinds = {"lengths": of.lengths, "tensions": of.tensions}
-        self.measured_command, self._lags = False, np.zeros(robot.m)
+        self.measured_command = False
         if robot.fixed_lengths is not None:
             self.drive, self._command = "lengths", np.tile(robot.fixed_lengths, (len(of.times), 1))
         elif of.commands is not None and (drive is None or (drive == "lengths") == (of.commanded == "lengths")):
             self.drive, self._command = drive or of.commanded, of.commands
             if self.drive == "forces" and not all(cable.winch for cable in robot.cables):
                 self.drive = "tensions"
-            elif self.drive == "tensions":
-                self._lags = lags_of(robot)
         else:
             elastic = all(cable.stiffness for cable in robot.cables)
             wanted = [drive] if drive in kinds else [*(["lengths"] if elastic else []), "tensions", "lengths"]
@@ -214,20 +212,28 @@ class Windows:
             carriers[:, :, index] = self._along(track)
         self._platform, self._carried = self._motion(self._along(self._track)), self._motion(carriers)
         self._attitudes = {index: self._attitude(carriers[:, :, index, 3:]) for index in self.flown}
-        values, of_cables = self._command, tuple(zip(self._command.T, self._lags, strict=True))
-        self._signal: Any = lambda at: np.stack([np.interp(at - lag, of.times, one) for one, lag in of_cables], axis=-1)
-        if self.drive == "lengths" and len(of.times) >= FEWEST:  # stiff cables feel where lines cut corners
-            even = smooth(of.times, values, self._neighbours) if self.measured_command else values
+        self._signal: Any = lambda at: np.stack([np.interp(at, of.times, one) for one in self._command.T], axis=-1)
+        if (self.drive == "lengths" or not self.measured_command) and len(of.times) >= FEWEST:
+            # Stiff cables feel where straight lines cut corners, and a platform the impulse that these miss.
+            even = smooth(of.times, self._command, self._neighbours) if self.measured_command else self._command
             self._signal = spline_of(of.times, even)
         dynamics = dynamics_of(self.robot)
         lengths = np.asarray(dynamics.cable_lengths(self._platform[0], carriers))
         self._cable_speed = np.gradient(lengths, self._dt, axis=1)
         first = [part[:, 0] for part in (*self._platform, *self._carried)]
-        self._balance = dynamics.wrench_matrix(first[0], first[3]), dynamics.required_wrench(*first)
-        self._pull = None
-        if of.tensions is not None:
-            even = smooth(of.times, of.tensions, widest_parabola(of.times, of.tensions))
-            self._pull = np.stack([np.interp(self.starts, of.times, one) for one in even.T], axis=1).clip(0.0)
+        balance = dynamics.wrench_matrix(first[0], first[3]), dynamics.required_wrench(*first)
+        forces = self._signal if self.drive == "forces" else None
+        at_starts = self.robot, of, self.starts, lengths[:, 0], balance, forces, self.usual_tension
+        self._tensions = StartTensions(*at_starts)
+
+    def _driven(self, at: np.ndarray) -> np.ndarray:
+        """Return the tensions or forces of the drives at times (W, K) with equal steps [s], (W, K, m) [N]."""
+        if self.measured_command or self.drive == "forces":
+            return self._signal(at)
+        before = round(2 * MARGIN / self._dt)
+        early = at[:, :1] - self._dt * np.arange(before, 0, -1)
+        commands = self._signal(np.concatenate([early, at], axis=1))
+        return given_by_drives(self.recorded.robot, commands, self._dt)[:, before:]
 
     def _along(self, track: PoseTrack) -> np.ndarray:
         """Return the poses of a track on the grid, (W, K + 1, 6), with angles that do not jump."""
@@ -247,24 +253,6 @@ class Windows:
         rate = Rotation.from_matrix(turned).as_rotvec().reshape(len(R), -1, 3) / self._dt
         quaternion = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(scalar_first=True).reshape(*R.shape[:2], 4)
         return np.concatenate([quaternion, np.pad(rate, ((0, 0), (0, 1), (0, 0)), mode="edge")], axis=-1)
-
-    def _tensions_at_start(self, with_: Parameters) -> np.ndarray:
-        """Return recorded tensions (W, m) [N], or those nearest to a tenth of their range that hold the platform."""
-        if self._pull is not None:
-            gains, zeros = self._cells(with_)
-            return ((self._pull - zeros) / gains).clip(0.0)
-        robot, (A, wrench) = self.robot, self._balance
-        usual = np.minimum(robot.t_min + 0.1 * (robot.t_max - robot.t_min), 2 * robot.force_scale)
-        scale = robot.wrench_scale * (robot.dof_mask > 0)
-        missing = scale * (wrench * with_.mass - A @ usual)
-        turned = np.array(changed(robot, with_).gravity) - robot.gravity
-        missing[..., :3] -= scale[:3] * with_.mass * robot.platform.mass * turned
-        return (usual + (np.linalg.pinv(scale[:, None] * A, rcond=1e-6) @ missing[..., None])[..., 0]).clip(0.0)
-
-    def _cells(self, with_: Parameters) -> np.ndarray:
-        """Return readings per newton and readings without tension of the load cells, (2, m)."""
-        gains, zeros = np.reshape(with_.load_cells, (2, -1))
-        return np.array([1 + gains, zeros * self.usual_tension])
 
     def _states(self, plant: Plant, pulls: np.ndarray, shift: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return states (V W, n) and unstrained lengths (V, W, m), for corrections (V, W, P) and tensions (W, m)."""
@@ -289,7 +277,8 @@ class Windows:
         if free:
             blocks[:, layout.LENGTH] = blocks[:, layout.REFERENCE] = lengths[:, 0] / stretch
         if self.drive == "forces":
-            blocks[:, layout.LENGTH_RATE] = lengths[:, 1] / stretch
+            stretching = np.tile(self._tensions.stretching, (len(shift), 1))
+            blocks[:, layout.LENGTH_RATE] = (lengths[:, 1] - stretching) / stretch
         states[:, -layout.CABLE_BLOCKS * m :] = blocks.reshape(len(states), -1)
         return states, (lengths[:, 0] / stretch).reshape(*shift.shape[:2], m)
 
@@ -304,7 +293,7 @@ class Windows:
         by = np.diag(self._steps_of_start) if nudged else np.zeros((0, len(self.start_sigma)))
         shift = self.start + np.concatenate([np.zeros((1, 1, by.shape[1])), by[:, None]])  # (V, W, P)
         count = len(shift)
-        states, own = self._states(plant, self._tensions_at_start(with_), shift)
+        states, own = self._states(plant, self._tensions.elastic(with_), shift)
         rows, cables = self._commands(plant, with_, own)
         at = (self.recorded.times[self.rows] - self.starts[:, None]) / dt
         number = np.clip(np.floor(at).astype(int), 0, steps - 1)
@@ -329,6 +318,10 @@ class Windows:
                         ends = ends.reshape(count, W, 2, -1)[:, w]
                         part[:, w, s] = (1 - share) * ends[:, :, 0] + share * ends[:, :, 1]
                 states[:] = history[:, 1]
+        if self.drive == "tensions":  # each is held for a step, in the middle of which it is right
+            before = np.clip(np.floor(at - 0.5).astype(int), 0, steps - 2)[..., None]
+            first, second = (np.take_along_axis(cables, (before + i)[None], axis=2) for i in (0, 1))
+            seen[1][:] = (first + (at[..., None] - 0.5 - before) * (second - first)).clip(0.0)
         speeds = np.take_along_axis(self._cable_speed, number[..., None], axis=1)  # (W, S, m)
         friction = (with_.friction + np.array(with_.cable_friction)) * np.tanh(speeds / SLOW)
         residuals = self._residuals(seen[0], seen[1], plant, friction, with_)
@@ -342,9 +335,9 @@ class Windows:
             along = self._signal(self._grid - with_.delay)  # (W, K + 1, m)
             cables = np.maximum(own[:, :, None] + along[:, 1:] - along[:, :1], layout.SHORTEST)
         else:
-            pulls, friction = self._signal(middle[:, :-1]), with_.friction + np.array(with_.cable_friction)
+            pulls, friction = self._driven(middle[:, :-1]), with_.friction + np.array(with_.cable_friction)
             if self.measured_command:
-                gains, zeros = self._cells(with_)
+                gains, zeros = cells_of(with_, self.usual_tension)
                 pulls = (pulls - zeros) / gains
             if self.drive == "tensions":
                 pulls = (pulls + friction * np.tanh(self._cable_speed[:, :-1] / SLOW)).clip(0.0)
@@ -378,13 +371,17 @@ class Windows:
             parts["rotation"] = np.where(moves, away.as_rotvec().reshape(position.shape), 0.0)
         if "tensions" in self.noise and of.tensions is not None:
             behind = (tensions - friction).clip(0.0) if self.drive == "lengths" else tensions
-            gains, zeros = self._cells(with_)
+            gains, zeros = cells_of(with_, self.usual_tension)
             parts["tensions"] = np.where(inside, of.tensions[rows] - (gains * behind + zeros), 0.0)
         if "lengths" in self.noise and of.lengths is not None:
             # The file's stiffness made lengths under tension unstrained, and an assumed one is not in the readings.
             of_file = of.under_tension or (self.drive == "tensions" and self.assumed)
             by = of.robot if of_file else plant.robot
-            away = np.where(inside, of.lengths[rows] - lengths / stretched(by, tensions), 0.0)
+            own = lengths / stretched(by, tensions)
+            if self.drive == "forces" and not of.under_tension:
+                blocks = states[..., -layout.CABLE_BLOCKS * of.robot.m :].reshape(*own.shape[:-1], -1, of.robot.m)
+                own = blocks[..., layout.LENGTH, :]  # damping, of which tensions include a part, elongates no cable
+            away = np.where(inside, of.lengths[rows] - own, 0.0)
             away -= away.sum(axis=2, keepdims=True) / inside.sum(axis=1, keepdims=True)  # offsets of the encoders
             parts["lengths"] = np.where(inside, away, 0.0)
         self.widths = [part.shape[-1] for part in parts.values()]

@@ -10,14 +10,15 @@ from functools import cache
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.interpolate import CubicSpline
 
-from towline import InputError, load, simulate, tensions
-from towline.control import LengthControl
+from towline import Dynamics, InputError, load, simulate, tensions
+from towline.control import Command, Controller, LengthControl
 from towline.estimation.logs.recorded import read_recorded
 from towline.models.cable import Winch
 from towline.plant import Plant
 from towline.simulation import Replay, replay
-from towline.simulation.replayed_robot import Parameters, changed
+from towline.simulation.replayed_robot import Parameters, changed, given_by_drives
 from towline.simulation.windows import Windows
 
 from .warm import towline as run
@@ -40,6 +41,17 @@ def with_mass(robot, factor):
 PLANAR = with_cables(load("planar-4"), stiffness=20e3, damping=20.0)
 WINCH = Winch(inertia=20, friction=15, speed_max=5, force_max=5000)
 COGIRO = with_cables(load("cogiro"), stiffness=200e3, damping=1000.0, winch=WINCH)
+
+
+class Commanded(Controller):
+    """Commands of every millisecond, whatever happens."""
+
+    def __init__(self, commands):
+        self.commands = commands
+
+    def step(self, time, state, reference):
+        now = self.commands[min(round(1e3 * time), len(self.commands) - 1)]
+        return Command(now, *reference[3:6], np.array(0))
 
 
 def swing(centre, size, rates, seconds):
@@ -183,6 +195,78 @@ def test_forces_of_motors_move_winches_with_inertia_and_friction(name, options, 
     result = replay(rough, log, delay=0.5e-3, **options)
     assert result.named[0] in ("friction", "cable_friction")  # 1 N less, of all cables or of each
     assert next(one.value for one in result.found if one.name == "friction") == pytest.approx(2.0, rel=0.1)
+
+
+@cache
+def pulled_by_motors(with_tensions):
+    """Eight cables on rubbing winches, pulled by known forces, and the columns of its recording with noise."""
+    robot = with_cables(COGIRO, damping=400.0, winch=WINCH)
+    held, times = np.asarray(tensions(robot, robot.home).tensions), 1e-3 * np.arange(2900)
+    phases = np.arange(8) * 2.4
+    forces = held * (1 + 0.15 * (np.sin(5 * times[:, None] + phases) - np.sin(phases) * np.exp(-3 * times[:, None])))
+    plant, draw, rows = Plant(robot, drive="forces"), np.random.default_rng(2), slice(300, 2900, 10)
+    run = plant.run(plant.start(tensions=held), plant.command(forces), 1e-3)
+    now = plant.read(run.states[:-1])
+    pose = now.pose[rows] + draw.normal(0, NOISE["pose"], (260, 6))
+    names = ("x [m]", "y [m]", "z [m]", "roll [rad]", "pitch [rad]", "yaw [rad]")
+    found = {"t [s]": times[rows]} | dict(zip(names, pose.T, strict=True))
+    found |= {f"l{i} [m]": one[rows] + draw.normal(0, NOISE["length"], 260) for i, one in enumerate(now.lengths.T)}
+    found |= {f"motor_force_cmd_{i} [N]": one[rows] for i, one in enumerate(forces.T)}
+    if with_tensions:
+        pulls = run.tensions[:-1][rows] + draw.normal(0, NOISE["tension"], (260, 8))
+        found |= {f"tension_{i} [N]": one for i, one in enumerate(pulls.T)}
+    return robot, found
+
+
+@pytest.mark.parametrize("with_tensions", [False, True])
+@pytest.mark.parametrize("factor", [0.8, 1.0, 1.2])
+def test_friction_of_motors_that_is_wrong_by_a_fifth_is_named(factor, with_tensions, tmp_path):
+    """Windows start from tensions that motors and winches show, and at the speeds of the winches' encoders."""
+    robot, found = pulled_by_motors(with_tensions)
+    wrong = with_cables(robot, winch=WINCH.model_copy(update={"friction": factor * WINCH.friction}))
+    result = replay(wrong, written(tmp_path / "motors.csv", found), delay=0.5e-3)
+    assert result.to_dict()["drive"] == "forces"
+    if factor == 1:
+        assert not result.named
+        rms, noise = result.rms(), result.matching.noise
+        assert all(rms[name] < 2 * noise[name] for name in rms)
+    else:
+        assert result.named[0] == "friction"
+        assert result.found[0].value == pytest.approx(WINCH.friction, rel=0.05)
+
+
+def test_windows_start_with_the_elongation_that_damped_cables_have(tmp_path):
+    """Load cells also feel damping: windows began with cables that were too long by its share of the tension."""
+    robot = with_cables(load("planar-4"), stiffness=20e3, damping=200.0)
+    path = swing((0, 0, 0.75), (0.15, 0, 0.1), (0.9, 1, 1.1), 3.0)
+    held, times, rows = np.asarray(tensions(robot, robot.home).tensions), 1e-3 * np.arange(3000), slice(0, 3000, 10)
+    lengths = Dynamics(robot).cable_lengths(CubicSpline(path["times"], path["poses"])(times)) / (1 + held / 20e3)
+    plant, draw = Plant(robot, drive="lengths"), np.random.default_rng(4)
+    run = plant.run(plant.start(tensions=held), plant.command(lengths), 1e-3)
+    now, pulls = plant.read(run.states[:-1]), run.tensions[:-1]
+    names = ("x [m]", "y [m]", "z [m]", "roll [rad]", "pitch [rad]", "yaw [rad]")
+    found = {"t [s]": times[rows]} | dict(zip(names, (now.pose[rows] + draw.normal(0, 1e-4, (300, 6))).T, strict=True))
+    found |= {f"l{i} [m]": one[rows] for i, one in enumerate(now.lengths.T)}
+    found |= {f"tension_{i} [N]": one[rows] + draw.normal(0, 0.03, 300) for i, one in enumerate(pulls.T)}
+    windows = Windows(read_recorded(robot, written(tmp_path / "damped.csv", found)), None, 0.3)
+    at = np.searchsorted(times, windows.starts)
+    taut = pulls[at] > 0
+    elastic = 20e3 * (Dynamics(robot).cable_lengths(now.pose) / now.lengths - 1)[at]
+    away = (windows._tensions.elastic(windows.usual) - elastic)[taut]
+    assert np.sqrt(np.mean(away**2)) < 0.5 * np.sqrt(np.mean((pulls[at] - elastic)[taut] ** 2))
+
+
+@pytest.mark.parametrize("damping", [0.0, 200.0, 8000.0])
+def test_tensions_of_drives_are_those_of_the_plant(damping):
+    """Commands with a kink: their drive answers with the plant's winches, without a shift of time that suits ramps."""
+    robot = with_cables(COGIRO, damping=damping)
+    held, times = np.asarray(tensions(robot, robot.home).tensions), 1e-3 * np.arange(400)
+    commands = held * (1 + np.clip(times - 0.1, 0, 0.1)[:, None] * [2, -2, 2, -2, 2, -2, 2, -2])
+    flight = simulate(robot, robot.home, Commanded(commands), duration=0.4, tolerance=9).trajectory
+    given = given_by_drives(robot, flight["tensions_commanded"].values[None], 1e-3)[0]
+    means = 0.5 * (given[1:] + given[:-1])  # over periods, as in simulations
+    away = means[1:390] - flight["tensions"].values[1:390]
+    assert np.abs(away).max() < 0.04 * np.abs(commands - held).max()
 
 
 @pytest.mark.parametrize(
