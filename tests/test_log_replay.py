@@ -367,6 +367,14 @@ def test_commanded_lengths_cut_no_corners_between_samples(tmp_path):
     assert not result.named
 
 
+def test_commanded_tensions_are_compared_at_the_times_of_samples(tmp_path, monkeypatch):
+    """Held for steps of the simulation, of 2 ms, they would be half a step late."""
+    monkeypatch.setitem(NOISE, "tension", 0.02)
+    found = columns("drives", every("drives", 25))
+    result = replay(COGIRO, written(tmp_path / "slow.csv", found), window=1.0)
+    assert np.sqrt(np.nanmean(result.residuals["tensions"][1:-1] ** 2)) < 1.8 * NOISE["tension"]
+
+
 def test_commands_before_a_recording_are_extended_by_lines(tmp_path):
     """A delay of 0.15 s needs those of 0.1 s before the first. Cubics through rounded ones were 0.5 m off."""
     rows, orders = np.arange(600, 2740, 10), motion("lengths")[1]["lengths_commanded"].values
