@@ -11,11 +11,11 @@ from towline.ocp.audits.excess import Excess
 from towline.ocp.nlp import solver
 from towline.ocp.nlp.guess import initial_guess, usual_guess
 from towline.ocp.nlp.linear import LinearDistances
-from towline.ocp.nlp.near import Near, is_local, parts, regions_near
+from towline.ocp.nlp.near import Near, is_local, jumps, parts, regions_near
 from towline.ocp.nlp.program import build
-from towline.ocp.nlp.rows import Mesh
+from towline.ocp.nlp.rows import CABLES, Mesh, swept
 from towline.ocp.planner import Planner
-from towline.ocp.search import feasible_changes, search
+from towline.ocp.search import feasible_changes, homotopy, search
 from towline.ocp.search.other_forces import larger_t_max
 from towline.ocp.search.refinement import _tightened
 from towline.ocp.tasks.lay_out import lay_out
@@ -277,3 +277,78 @@ def test_a_change_of_one_scenario_is_made_once():
     first, second = scenario_of(TASK), scenario_of(TASK)
     assert [make(first), make(second), make(first), make(second)] == [1, 2, 1, 2]
     assert made == [first, second]
+
+
+WIRE = {"kind": "capsule", "name": "wire", "radius": 0.01, "platform": None, "cables": 0.0, "carriers": None}
+
+
+def ends_of_cable(cable, place):
+    """Return anchor and attachment of a cable of the platform at a place, (3,) each [m]."""
+    its = load("ipanema-1").cables[cable]
+    return np.array(its.anchor), np.array(its.attachment) + place
+
+
+def across(cable, place, aside=0.0):
+    """Return a wire across the middle of a cable of the platform at a place, which moves along x, so much `aside`."""
+    anchor, attachment = ends_of_cable(cable, place)
+    along = np.cross(anchor - attachment, [1, 0, 0])
+    normal = np.cross(along, anchor - attachment)
+    middle = (anchor + attachment) / 2 + aside * normal / np.linalg.norm(normal)
+    along *= 0.1 / np.linalg.norm(along)
+    return WIRE | {"start": (middle - along).tolist(), "end": (middle + along).tolist()}
+
+
+def test_a_cable_is_kept_from_a_wire_at_places_between_two_points():
+    """The middle of the cable moves by 0.05 m over a wire of 0.02 m, which it misses at both points."""
+    places = np.array([[0.15, 0, 1.2], [0.25, 0, 1.2]])
+    wire, robot = across(2, [0.2, 0, 1.2]), load("ipanema-1")
+    scenario = scenario_of(TASK | {"limits": {"keep_out": [wire]}})
+    assert not swept(scenario, Mesh(6))
+    [(limit, way)] = swept(scenario, Mesh(6, between=(CABLES,))).items()
+    (first, second), still = np.hstack([places, np.zeros((2, 15))]), [np.zeros(18)] * len(robot.carriers)
+    values = np.array(way(first, *still, second, *still)).reshape(-1, robot.m)[:, 2]
+    share = np.linspace(0, 1, 2001)[:, None]
+    axis = wire["start"] + share * np.subtract(wire["end"], wire["start"])
+
+    def apart(part):
+        anchor, attachment = ends_of_cable(2, places[0] + part * (places[1] - places[0]))
+        near = attachment + share[800:1201] * (anchor - attachment)
+        return np.linalg.norm(near[:, None] - axis, axis=2).min() - 0.01
+
+    assert values == pytest.approx([apart(1 / 3), apart(2 / 3)], abs=1e-4)
+    assert max(values) < limit.low < min(apart(0), apart(1))
+    whole, sparse = (build(scenario, Mesh(6, between=its)) for its in ((CABLES,), ()))
+    assert len(whole.lower_g) - len(sparse.lower_g) == 2 * 6 * robot.m  # nodes keep theirs
+
+
+@pytest.mark.parametrize(("aside", "jump"), [(0.0, True), (0.008, False), (-0.008, False)])
+def test_a_jump_over_a_wire_is_told_from_a_touch(aside, jump):
+    """Between two points so far apart, a bend of the way would be larger than the wire."""
+    scenario = scenario_of(TASK | {"limits": {"keep_out": [across(2, [0.2, 0, 1.2], aside)]}})
+    guess = initial_guess(scenario, np.array([0.0, 0.45, 0.55, 1.0]) * scenario.duration)
+    line = replace(guess, q=0 * guess.q, v=0 * guess.v, a=0 * guess.a)  # halfway it is at x = 0.2
+    assert jumps(scenario, line) is jump
+
+
+@pytest.mark.parametrize("solved", [True, False])
+def test_where_a_solution_jumps_programs_have_rows_of_cables_between_their_nodes(monkeypatch, solved):
+    scenario = scenario_of(TASK | {"steps": 20, "limits": {"keep_out": [across(2, [0.2, 0, 1.2])]}})
+    looking, own, meshes = search.Search(scenario, {}, None), search.Search.solve, []
+
+    def solve(self, name, mesh, *arguments, **named):
+        meshes.append(mesh)
+        outcome = own(self, name, mesh, *arguments, **named)
+        return replace(outcome, success=outcome.success and (solved or not mesh.between))
+
+    monkeypatch.setattr(search.Search, "solve", solve)
+    kept = homotopy.from_easier(looking, Mesh(20), None, True)
+    assert kept.success
+    assert [mesh.between for mesh in meshes] == [()]
+    monkeypatch.setattr(homotopy, "jumps", lambda scenario, motion: True)
+    meshes.clear()
+    looking = search.Search(scenario, {}, None)
+    outcome = homotopy.from_easier(looking, Mesh(20), None, True)
+    assert outcome.success
+    assert {mesh.between for mesh in meshes} == {(), (CABLES,)}
+    assert looking.between == ((CABLES,) if solved else ())
+    assert looking.audit(outcome).passed or not solved

@@ -70,6 +70,7 @@ class Limit(ABC):
             fixed; infinite if unknown, 1 for a distance. With it the planner proves that an obstacle blocks the way.
         thickness: For a distance from a keep-out region, its thickness [m]. A motion may jump over a thin region
             between two nodes, so the program also constrains the distance between them. Infinite for other limits.
+        only_between: Whether `on_the_way` has values at places between the two instants, not at these.
         phases: Indices of the phases of the task in which it holds; None for all times.
     """
 
@@ -84,6 +85,7 @@ class Limit(ABC):
     shown: bool = True
     per_metre: float = np.inf
     thickness: float = np.inf
+    only_between: bool = False
     phases: frozenset[int] | None = None
 
     @abstractmethod
@@ -94,7 +96,7 @@ class Limit(ABC):
         """Return the smallest values while all points move straight from one instant to another, (k, 1).
 
         The program limits these values where a step may jump over a region. By default there are none, and it limits
-        the values at its nodes.
+        the values at its nodes; both where these are `only_between` the instants.
         """
         return None
 

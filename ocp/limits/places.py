@@ -8,7 +8,6 @@ from the other. Bodies with the same skeleton but round edges are nearer by thei
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -113,6 +112,8 @@ class CarriersOutside(_PointsOutside):
 class CablesOutside(Outside):
     """Keep the cables out of a region."""
 
+    only_between = True
+
     def __init__(self, robot: Robot, place: Shape, called: str, riding: bool, least: float):
         super().__init__(place, called, riding, least)
         self.name = "cable_platform_clearance" if riding else "keep_out"
@@ -123,6 +124,11 @@ class CablesOutside(Outside):
         anchors = self._points(state, state.anchors)
         ends = ca.SX(ca.DM(state.robot.attachments.T)) if self._riding else state.attachments
         return [Pair(ca.horzcat(ends[:, i], anchors[:, i]), ca.SX(3, 0)) for i in range(state.robot.m)]
+
+    @override
+    def on_the_way(self, first: State, second: State) -> ca.SX:
+        """Return the values at places between, which are as near for cables as for bodies; nodes have rows too."""
+        return ca.vertcat(*(self.values(first.toward(second, share)) for share in PLACES[:-1]))
 
 
 class BodyOutside(Outside):
@@ -152,9 +158,7 @@ class BodyOutside(Outside):
     @override
     def on_the_way(self, first: State, second: State) -> ca.SX:
         """Return the values at a few places of the way, which is no edge of a body itself."""
-        poses = [first.platform.pose + share * (second.platform.pose - first.platform.pose) for share in PLACES]
-        states = (replace(first, platform=first.platform._replace(pose=pose)) for pose in poses)
-        return ca.vertcat(*(self.values(state) for state in states))
+        return ca.vertcat(*(self.values(first.toward(second, share)) for share in PLACES))
 
 
 def body_outside(body: Shape, whose: str, place: Shape, called: str, least: float) -> Iterator[Distance]:

@@ -1,7 +1,7 @@
 """`State`: the state at one instant, as CasADi symbols, on which a limit may depend."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, Self
 
@@ -116,6 +116,15 @@ class State(Displayed):
             carrier.required_effort(*body, pull_on_carrier(robot, i, self.run, body.pose, self.tensions), gravity)
             for i, (carrier, body) in enumerate(zip(robot.carriers, self.carriers, strict=True))
         ]
+
+    def toward(self, other: Self, share: float) -> Self:
+        """Return this state with the poses at a share of the straight way to those of another."""
+
+        def moved(own: Body, its: Body) -> Body:
+            return own._replace(pose=own.pose + share * (its.pose - own.pose))
+
+        carriers = tuple(map(moved, self.carriers, other.carriers))
+        return replace(self, platform=moved(self.platform, other.platform), carriers=carriers)
 
     def rate(self, values: ca.SX) -> ca.SX:
         """Return the time derivative of an expression of the poses and velocities."""

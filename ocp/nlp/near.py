@@ -68,7 +68,7 @@ class Near(Displayed):
     def strays(self, scenario: Scenario, shares: np.ndarray, motion: Deviation) -> bool:
         """Return whether a motion is in a region that is left out there, deeper than a bend of its way would be."""
         slack, moved, _ = _kept(scenario, shares, motion)
-        deep = slack[:, 1:-1] < -BEND * (moved[1:] + moved[:-1])
+        deep = slack[:, 1:-1] < -_bend(scenario, moved[1:] + moved[:-1])
         return bool((deep & ~self.chosen[:, 1:-1]).any())
 
     def _exceeded(self, slack: np.ndarray, moved: np.ndarray) -> np.ndarray:
@@ -135,7 +135,16 @@ def jumps(scenario: Scenario, motion: Deviation) -> bool:
     nodes = motion.nodes / motion.nodes[-1]
     shares = np.insert(nodes, np.arange(1, len(nodes)), (nodes[1:] + nodes[:-1]) / 2)
     slack, moved, _ = _kept(scenario, shares, motion)
-    return bool((slack[:, 1::2] < -BEND * (moved[::2] + moved[1::2])).any())
+    return bool((slack[:, 1::2] < -_bend(scenario, moved[::2] + moved[1::2])).any())
+
+
+def _bend(scenario: Scenario, moved: np.ndarray) -> np.ndarray:
+    """Return how deep the bend of a way of length `moved` (k,) may be in each region, (parts, k) [m].
+
+    It is not nearer to the middle than to the surface, where a program would come out of a thin region on either side.
+    """
+    halfway = np.array([scenario.limits.all[index].thickness / 4 for index, _ in parts(scenario.limits)])
+    return np.minimum(BEND * moved, halfway[:, None])
 
 
 def _kept(scenario: Scenario, shares: np.ndarray, motion: Deviation) -> tuple[np.ndarray, np.ndarray, float]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base.display import Displayed
 from ..limits import Limit
-from ..limits.places import BodyOutside
+from ..limits.places import BodyOutside, CablesOutside
 from ..tasks.bernstein import Values
 from ..tasks.scenario import POSITION, Scenario
 from .held import Spans, held_spans
@@ -19,6 +19,7 @@ from .layout import DURATION, MARGIN, Layout
 
 OTHER_COSTS = 1e-6  # of all but the missing wrench, in the elastic program: which is then the least there is
 MANY = 12  # free coordinates: robots with more are teams
+CABLES = "cables"  # in `Mesh.between`
 STEPS = 4  # a motion is rarely that many times as fast as its reference
 
 
@@ -55,7 +56,7 @@ class Mesh(Displayed):
     # Name of a limit, what it is about, and the share by which it is reduced beside, as an audit missed it.
     further: tuple[tuple[str, str, float], ...] = ()
     # Names of limits that rows between the points keep too, since an audit missed them there: of the platform's speed,
-    # and of tensions.
+    # and of tensions. `CABLES`: of distances of cables from regions too, since a motion jumped over one.
     between: tuple[str, ...] = ()
     elastic: bool = False  # whether A t = w + s with a high cost on the slack s, so that there is always a solution
 
@@ -161,17 +162,18 @@ def in_world(scenario: Scenario, platform: list[ca.SX], carriers: list[list[ca.S
 
 
 def swept(scenario: Scenario, mesh: Mesh) -> dict[Limit, ca.Function]:
-    """Return the limits that the program keeps between nodes rather than at them, and their functions.
+    """Return the limits that the program keeps between nodes, and their functions.
 
     They are distances from regions that are thinner than a few steps of the reference motion: for teams only distances
     of bodies, since a beam under quadrotors jumped over a post on every mesh, but four quadrotors with a point load
     took four times as long through a slot; for other robots distances of points, since a finer mesh finds what a body
-    jumps over.
+    jumps over, and of cables where the mesh has them `between`.
     """
     platform, carriers = scenario.references(scenario.scheme.shares(mesh.steps) * scenario.duration)
     ways = [np.diff(motion.pose[:, POSITION], axis=0) for motion in (platform, *carriers)]
     longest = max(float(np.linalg.norm(way, axis=1).max()) for way in ways)  # from node to node
     thin = [limit for limit in scenario.limits if limit.thickness < STEPS * longest]
     thin = [limit for limit in thin if isinstance(limit, BodyOutside) == (scenario.count > MANY)]
+    thin = [limit for limit in thin if CABLES in mesh.between or not isinstance(limit, CablesOutside)]
     functions = {limit: scenario.limits.on_the_way(limit) for limit in thin}
     return {limit: function for limit, function in functions.items() if function is not None}

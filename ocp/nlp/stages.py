@@ -155,7 +155,7 @@ def _limit_rows(
     evaluated = limits.function(*state)
     for index, (limit, place) in enumerate(zip(limits, limits.places, strict=True)):
         hull = limit.hull if limit.is_convex else None
-        elsewhere = isinstance(limit, Rate) or limit in on_the_way
+        elsewhere = isinstance(limit, Rate) or (limit in on_the_way and not limit.only_between)
         if elsewhere or (hull is not None and (hull.order < ACCELERATION or not scenario.moves(hull))):
             continue
         yield index, bounded(limit, evaluated[place], layout.slack(x, limit))

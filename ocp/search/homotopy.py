@@ -1,10 +1,13 @@
 """Solve a program from the solutions of easier ones: slower, coarser, with linear distances (`from_easier`)."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from ..limits.places import CablesOutside
 from ..nlp.guess import balanced
 from ..nlp.near import has_places, jumps
-from ..nlp.rows import MANY, Mesh
+from ..nlp.rows import CABLES, MANY, Mesh
 from ..nlp.solver import CIRCLING, Outcome
 from ..tasks.deviation import Deviation
 from .search import Search
@@ -20,7 +23,7 @@ def from_easier(search: Search, mesh: Mesh, start: Deviation | None, guessed: bo
     """Solve the program from a motion that is nearer to its solution than `start`, if there is one."""
     if search.knows(mesh):
         return search.solve("nonlinear program", mesh, start)
-    coarse = _coarse(search) if guessed else None
+    coarse = _coarse(search, mesh) if guessed else None
     near = _slowly(search, coarse or mesh, start) if guessed else None
     linear = search.approach(coarse or mesh, near or start)
     near = near if linear is None else linear.deviation
@@ -33,6 +36,12 @@ def from_easier(search: Search, mesh: Mesh, start: Deviation | None, guessed: bo
         near = outcome.deviation if optimal else near
     # Linear distances leave a motion at their bounds. From a small barrier the program would creep along them.
     outcome = search.solve("nonlinear program", mesh, near or start, coarser=optimal, clear=near is not None)
+    if guessed and outcome.success and _cable_jumps(search, mesh, outcome.deviation):
+        swept = replace(mesh, between=(CABLES,))
+        again = from_easier(search, swept, start, guessed)
+        if again.success:
+            search.between = swept.between  # of later meshes too
+            return again
     if outcome.success or near is None or search.seconds_left <= 0:
         return outcome
     return search.solve("nonlinear program", mesh, start)
@@ -57,7 +66,18 @@ def _slowly(search: Search, mesh: Mesh, start: Deviation | None) -> Deviation | 
     return linear.deviation.stretched(scenario.duration / slow.duration) if span is None else linear.deviation
 
 
-def _coarse(search: Search) -> Mesh | None:
+def _cable_jumps(search: Search, mesh: Mesh, motion: Deviation) -> bool:
+    """Return whether a motion jumps over a region, and a mesh with rows of cables between its nodes could prevent it.
+
+    A cable on the far side at one node and on the near side at the next does not come out of there on finer meshes.
+    """
+    scenario = search.scenario
+    possible = CABLES not in mesh.between and scenario.count <= MANY and search.seconds_left > 0
+    possible = possible and any(isinstance(limit, CablesOutside) for limit in scenario.limits)
+    return possible and jumps(scenario, motion)
+
+
+def _coarse(search: Search, mesh: Mesh) -> Mesh | None:
     """Return the mesh whose optimum the program of the task's own starts from; None if that would save no time."""
     scenario = search.scenario
     steps, coarse, times = scenario.task.steps, COARSE, 4
@@ -65,4 +85,4 @@ def _coarse(search: Search) -> Mesh | None:
         coarse, times = COARSE_OF_MANY, 2 if has_places(scenario) else 4
     elif has_places(scenario):
         coarse, times = min(max(steps // 2, COARSE_PAST_PLACES), COARSE), 2
-    return Mesh(coarse) if steps >= times * coarse else None
+    return replace(mesh, steps=coarse) if steps >= times * coarse else None

@@ -48,7 +48,7 @@ def refine(search: Search, outcome: Outcome) -> str:
     Limits that are exceeded a little between the nodes are tightened by that on the same mesh, a few times. Else, and
     where equations are missed, which cannot be tightened, the mesh gets finer each time.
     """
-    scenario, mesh = search.scenario, Mesh(search.scenario.task.steps)
+    scenario, mesh = search.scenario, Mesh(search.scenario.task.steps, between=search.between)
     audit = search.audit(outcome)
     reserve, shrink = 0.0, 0.0
     for attempt in range(1, REFINEMENTS + 2):

@@ -83,6 +83,7 @@ class Search:
         self.stages: list[PlannerStep] = []
         self.known: Audit | None = None  # of a motion that the task fixes
         self.mesh: Mesh | None = None  # of the program that was solved last
+        self.between: tuple[str, ...] = ()  # of the meshes (`Mesh.between`)
         self.built: list[Stages] = []  # of programs
         self._iterates: list[tuple[int, float, float]] = []
         self._audited: list[tuple[float, Outcome, Audit]] = []
