@@ -73,6 +73,10 @@ def test_standard_deviations_include_pulleys_that_the_file_lacks(kind, radius, a
     squares, count = surprise(result, truth)
     assert squares < chi2.ppf(0.999, count)
     assert "which the file lacks" in result.report()
+    assert not [way for way in missing_pulleys._with_pulleys(file) if kind == "planar" and way.endswith("y")]
+    # Axes that are less likely add little, although their radii could be larger.
+    sigmas = [one.sigma for one in result.parameters if ".anchor." in one.name and one.sigma < np.inf]
+    assert max(sigmas) < 1.3 * np.abs(result.robot.anchors - truth[:, :3]).max()
 
 
 def test_pulleys_above_and_below_have_axes_of_their_own(monkeypatch):
@@ -84,6 +88,13 @@ def test_pulleys_above_and_below_have_axes_of_their_own(monkeypatch):
     assert way == "away from the platform along z"
     assert found == pytest.approx(0.06, rel=0.2)
     squares, count = surprise(result, truth)
+    assert squares < chi2.ppf(0.999, count)
+
+
+@pytest.mark.parametrize("kind", ["planar", "point"])
+def test_standard_deviations_include_pulleys_of_several_radii(kind):
+    file, log, truth = a_log(kind, 1, np.array([0.04, 0.05, 0.06, 0.05]))
+    squares, count = surprise(calibrate(file, log), truth)
     assert squares < chi2.ppf(0.999, count)
 
 

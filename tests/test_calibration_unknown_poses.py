@@ -216,29 +216,51 @@ def test_noise_of_unmeasured_pitch_tells_nothing_of_anchors(turn):
     assert np.sqrt(np.mean(np.square(errors))) < 0.006
 
 
-def test_offsets_that_an_ahrs_hardly_shows_stay_near_the_file():
-    """Six cables and orientations within 0.5 degrees: errors of the file are better known than most offsets."""
+def under_six_cables():
+    """A robot whose cables all come from above."""
     angles = np.radians([[80, 100, 200, 220, 320, 340], [40, 140, 160, 260, 280, 20]])
     anchors, attachments = (
         radius * np.column_stack([np.cos(around), np.sin(around), np.full(6, height)])
         for around, radius, height in zip(angles, (3.0, 0.6), (1.2, 0.1), strict=True)
     )
     body = {"mass": 20.0, "inertia": [2, 2, 3, 0, 0, 0], "home": [0, 0, 1.7, 0, 0, 0]}
-    robot = framed(zip(anchors, attachments, strict=True), body)
+    return framed(zip(anchors, attachments, strict=True), body)
+
+
+def seen_by_ahrs(robot, seed, built=None):
+    """Positions, readings with offsets of 20 mm, and orientations within 0.5 degrees, at 27 poses."""
+    draw, built = np.random.default_rng(seed), robot if built is None else built
+    poses = robot.home + draw.uniform(-1, 1, (27, 6)) * [1.3, 1.1, 0.6, 0.12, 0.12, 0.12]
+    own = draw.normal(0, 0.02, 6)
+    readings = Dynamics(built).cable_lengths(poses) - own + draw.normal(0, NOISE, (27, 6))
+    turned = Rotation.from_euler("xyz", poses[:, 3:]) * Rotation.from_rotvec(draw.normal(0, np.radians(0.5), (27, 3)))
+    sigma = {"lengths": NOISE, "rotation": np.radians(0.5)}
+    return poses, own, Measurements(readings, orientations=turned.as_euler("xyz"), sigma=sigma)
+
+
+def test_offsets_that_an_ahrs_hardly_shows_stay_near_the_file():
+    """Six cables and orientations within 0.5 degrees: errors of the file are better known than most offsets."""
+    robot = under_six_cables()
     before, after, surprises = [], [], []
     for seed in range(4):
-        draw = np.random.default_rng(seed)
-        poses = robot.home + draw.uniform(-1, 1, (27, 6)) * [1.3, 1.1, 0.6, 0.12, 0.12, 0.12]
-        turned = Rotation.from_euler("xyz", poses[:, 3:])
-        ends = poses[:, None, :3] + np.einsum("nij,mj->nmi", turned.as_matrix(), attachments)
-        own = draw.normal(0, 0.02, 6)
-        readings = np.linalg.norm(ends - anchors, axis=2) - own + draw.normal(0, NOISE, (27, 6))
-        seen = (turned * Rotation.from_rotvec(draw.normal(0, np.radians(0.5), (27, 3)))).as_euler("xyz")
-        sigma = {"lengths": NOISE, "rotation": np.radians(0.5)}
-        result = calibrate(robot, Measurements(readings, orientations=seen, sigma=sigma), ["offsets"])
+        _, own, log = seen_by_ahrs(robot, seed)
+        result = calibrate(robot, log, ["offsets"])
         error = np.array([one.value for one in result.parameters]) - own
         before.append((own**2).mean())
         after.append((error**2).mean())
         surprises.append(error @ np.linalg.solve(result.covariance, error) / 6)
     assert np.mean(after) < np.mean(before)
     assert np.mean(surprises) < 2.5
+
+
+def test_offsets_that_an_ahrs_does_not_show_are_not_written():
+    """Anchors wrong by 10 mm, too: poses may become worse than with the file, unless its errors are stated."""
+    robot, squares = under_six_cables(), []
+    for seed in range(3):
+        poses, _, log = seen_by_ahrs(robot, seed, moved_anchors(robot, np.random.default_rng(seed), 0.01))
+        alone, stated = calibrate(robot, log), calibrate(robot, log, prior={"offsets": 0.02, "anchors": 0.01})
+        assert "offsets are in the file: give priors" in alone.refused
+        assert stated.refused is None
+        nothing = calibrate(robot, log, ["offsets"], {"offsets": 1e-6})
+        squares.append([((one.poses - poses)[:, :3] ** 2).sum(axis=1).mean() for one in (stated, nothing)])
+    assert np.less(*np.mean(squares, axis=0))

@@ -78,6 +78,11 @@ def errors_of_file(solved: Solved, prior: Mapping[str, float]) -> dict[str, floa
     return result
 
 
+def offsets_are_open(solved: Solved, prior: Mapping[str, float]) -> bool:
+    """Return whether a fit to orientations alone shows of no axis of the offsets how wrong the file is."""
+    return prior.get("offsets") == LOOSE_SHARE * length_of(solved.model.robot)
+
+
 def _along_axes(solved: Solved, group: str, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return variances of a group of parameters along principal axes, rising, and changes from the file along them."""
     of = solved.model.parameters

@@ -18,7 +18,7 @@ from ..logs.measurements import Measurements
 from .clock import is_still
 from .cross_validation import WORSE, HeldOut, compare, poses_fitted
 from .differences import PLAUSIBLE
-from .file_errors import ENDS
+from .file_errors import ENDS, offsets_are_open
 from .geometry import length_of
 from .load_changes import load_changes
 from .missing_pulleys import MissingPulleys, missing_pulleys
@@ -83,8 +83,9 @@ class CalibrationData(Displayed):
 
         The log probably has an input error, the fit did not converge, an end of a cable or the CoM would move by more
         than half of the cables' length (3 % if winches are locked) or be known worse than in the file, the anchors of a
-        robot without measured positions would be 3 % farther apart or closer, residuals exceed 3 % of the cables'
-        length, a third of the readings are outliers, the mass changes, or the file fits validation samples better.
+        robot without measured positions would be 3 % farther apart or closer, or its offsets are not shown, residuals
+        exceed 3 % of the cables' length, a third of the readings are outliers, the mass changes, or the file fits
+        validation samples better.
         """
         if self.doubt is not None:
             return self.doubt
@@ -127,6 +128,8 @@ class CalibrationData(Displayed):
                 "lengths without positions do not determine the size of the robot: its anchors would be "
                 f"{apart(self.growth)}; give a prior"
             )
+        if offsets_are_open(self._solved, self.prior):
+            return "orientations do not show how wrong the offsets are in the file: give priors of offsets and anchors"
         still = is_still(self.measurements) and self.measurements.carrier_poses is None
         ends = [(one, end) for one in self.parameters for end in ENDS.values() if f".{end[:-1]}." in one.name]
         sigmas = [(one.sigma / self.prior[end], one, self.prior[end]) for one, end in ends if end in self.prior]
@@ -228,10 +231,7 @@ class CalibrationData(Displayed):
 
     @cached_property
     def information(self) -> np.ndarray:
-        """Return the information about the parameters, priors included, with parameters as lengths, (p, p) [1/m^2].
-
-        It is the pseudo-inverse of the covariance, factors `noise` and `autocorrelation` included.
-        """
+        """Return the pseudo-inverse of the covariance, priors included, with parameters as lengths, (p, p) [1/m^2]."""
         return self._possible_pulleys.information if self._possible_pulleys else self._noise.information
 
     @property
