@@ -102,13 +102,19 @@ class FaultTolerant(Controller):
 
     def _prepare(self, index: int, options: dict[str, Any]) -> None:
         """Find a formation of the others that they reach, the nearest one or one with less tilt, or warn."""
+        known = "a formation exists, but the platform tilts too fast for the others to reach it"
+        reason = f"{self.robot.name} loses its load without {self.robot.carriers[index].name}: {known}"
         for level in LEVELS:
-            self._rests[index] = rest = _without(self.robot, index, options, level)
-            if rest is None or (level == LEVELS[0] and np.linalg.norm(rest.tilt) < STEEP) or self._settles(index):
+            rest = _without(self.robot, index, options, level)
+            if isinstance(rest, str):
+                reason = rest if level == LEVELS[0] else reason
+                break
+            self._rests[index] = rest
+            if (level == LEVELS[0] and np.linalg.norm(rest.tilt) < STEEP) or self._settles(index):
                 return
         self._rests[index] = None
-        known = "a formation exists, but the platform tilts too fast for the others to reach it"
-        warn(f"{self.robot.name} loses its load without {self.robot.carriers[index].name}: {known}", stacklevel=3)
+        if reason:
+            warn(reason, stacklevel=3)
 
     def _settles(self, index: int) -> bool:
         """Return whether the others bring the platform to rest where it was, after a loss at rest at home."""
@@ -226,8 +232,8 @@ class FaultTolerant(Controller):
         return given._replace(**changes, released=~np.isin(np.arange(self.robot.m), rest.cables))
 
 
-def _without(robot: Robot, index: int, options: dict[str, Any], level: float) -> Rest | None:
-    """Return the team without a carrier and its cables; None, with a warning, if it cannot carry the platform."""
+def _without(robot: Robot, index: int, options: dict[str, Any], level: float) -> Rest | str:
+    """Return the team without a carrier and its cables, or why it cannot carry the platform; "" without carriers."""
     data, lengths = robot.model_dump(), robot.fixed_lengths
     assert lengths is not None
     carriers = np.delete(np.arange(len(robot.carriers)), index)
@@ -235,14 +241,13 @@ def _without(robot: Robot, index: int, options: dict[str, Any], level: float) ->
     data["carriers"] = [data["carriers"][i] for i in carriers]
     data["cables"] = [{**data["cables"][i], "length": float(lengths[i])} for i in cables]
     if len(carriers) == 0:
-        return None
+        return ""
     home, name = robot.home, robot.carriers[index].name
     found = formation(Robot.model_validate(data), home, robot.carrier_home[carriers], lengths[cables], level)
     if not found.exists:
         force, moment = quantity_row(found.missing[:3], "N"), quantity_row(found.missing[3:], "N m")
         lacks = f"a force of {force} and a moment of {moment} about the CoM are missing"
-        warn(f"{robot.name} cannot rest without {name}: {lacks}", stacklevel=4)
-        return None
+        return f"{robot.name} cannot rest without {name}: {lacks}"
     data["platform"]["home"] = found.pose.tolist()
     for carrier, pose in zip(data["carriers"], found.carrier_pose.tolist(), strict=True):
         carrier["home"] = pose

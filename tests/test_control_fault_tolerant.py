@@ -27,7 +27,7 @@ def prepared():
     """Return a controller that is prepared for the loss of one carrier only, which takes less time."""
     usual = fault_tolerant._without
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fault_tolerant, "_without", lambda *given: usual(*given) if given[1] == 0 else None)
+        patch.setattr(fault_tolerant, "_without", lambda *given: usual(*given) if given[1] == 0 else "")
         return FaultTolerant("multi-quadrotor-4")
 
 
@@ -128,7 +128,7 @@ def kite(turned):
 def test_a_formation_that_is_not_reached_is_refused_at_construction(monkeypatch):
     """Without the third carrier the load tips over before the others can lean their cables: it was 3 m off."""
     robot, usual = kite(0.2), fault_tolerant._without
-    monkeypatch.setattr(fault_tolerant, "_without", lambda *given: usual(*given) if given[1] == 2 else None)
+    monkeypatch.setattr(fault_tolerant, "_without", lambda *given: usual(*given) if given[1] == 2 else "")
     with pytest.warns(UserWarning, match="multi-quadrotor-4 loses its load without quad3: a formation exists"):
         controller = FaultTolerant(robot)
     monkeypatch.setattr(FaultTolerant, "_settles", lambda *_: True)
