@@ -24,7 +24,7 @@ def is_underactuated(robot: Robot) -> bool:
 def needs_carriers(robot: Robot) -> bool:
     """Return whether the platform has freedoms at home that tensions hardly control, but carriers that move do."""
     count = len(robot.platform.dof)
-    if robot.m < count or all(carrier.kind == "ground" for carrier in robot.carriers):
+    if robot.m < count or not any(carrier.moves for carrier in robot.carriers):
         return robot.m < count
     scale = robot.wrench_scale * robot.dof_mask
     sizes = np.linalg.svd(scale[:, None] * dynamics_of(robot).wrench_matrix(robot.home, robot.carrier_home))[1]
