@@ -19,8 +19,8 @@ from .distance import Distance, Pair
 from .limit import Limit
 from .state import Body, State
 
-# Operations: to find common subexpressions takes longer than a plan's evaluations gain by them, a tenth.
-MANY = 5000
+# To find common subexpressions among so many takes longer than a plan's evaluations gain by them, a tenth.
+MANY_OPERATIONS = 5000
 Motion: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]  # pose, velocity, acceleration
 
 
@@ -50,7 +50,7 @@ def of_motions(name: str, bodies: Sequence[Body], others: Sequence[ca.SX], value
     """
     symbols = [body if body.moves else Body.symbols() for body in bodies]
     inputs = [part for body in symbols for part in body] + [*others]
-    small = ca.n_nodes(ca.veccat(*values)) < MANY
+    small = ca.n_nodes(ca.veccat(*values)) < MANY_OPERATIONS
     parts = ca.Function("of_parts", inputs, [*values], {"cse": small})
     whole = [ca.SX.sym(f"body{i}", 18) for i in range(len(bodies))]
     given = [part for body in whole for part in ca.vertsplit(body, 6)]

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...base.display import Displayed
 from ..limits import Limit
-from ..limits.limits import MANY, Limits
+from ..limits.limits import MANY_OPERATIONS, Limits
 from ..tasks.scheme import Scheme
 from .held import eased
 from .near import is_local
@@ -283,7 +283,7 @@ def _function_of_some(
     unknowns: dict[str, ca.SX], parameters: dict[str, ca.SX], values: ca.SX, picked: tuple[int, ...]
 ) -> Differentiable:
     its = values[list(picked)]
-    small = ca.n_nodes(its) < MANY  # common subexpressions of bodies with many faces take longest to find
+    small = ca.n_nodes(its) < MANY_OPERATIONS  # common subexpressions of bodies with many faces take longest to find
     return function_of("near", unknowns, parameters, its, small)
 
 
