@@ -118,7 +118,7 @@ def load_netcdf(path: Path, refusal: str) -> xr.Dataset:
 
     with _alone:  # the hook and the warnings belong to the whole process
         # A damaged file leaves a half-opened one behind, whose closing prints a traceback as soon as it is collected.
-        hook, sys.unraisablehook = sys.unraisablehook, lambda unraisable: None
+        hook, sys.unraisablehook, is_opened = sys.unraisablehook, lambda unraisable: None, False
         try:
             try:
                 size = check_file(path, "a NetCDF file", LARGEST)
@@ -128,13 +128,15 @@ def load_netcdf(path: Path, refusal: str) -> xr.Dataset:
                     check_hdf5(file, size)
                     with warnings.catch_warnings():
                         warnings.simplefilter("ignore")  # of what is unusual; whoever uses it checks what matters
+                        is_opened = True
                         opened = h5netcdf.File(file, "r", decode_vlen_strings=True, phony_dims="access")
                         return xr.load_dataset(xr.backends.H5NetCDFStore(opened))
             except Exception as error:  # it may fail at any place of three libraries
                 # HDF5 has its own message of several lines, where others have a few words.
                 reason = printable((str(getattr(error, "strerror", None) or error) or "empty").splitlines()[0])
                 reason = "not a NetCDF file" if "signature not found" in reason else reason
-            gc.collect()
+            if is_opened:
+                gc.collect()
         finally:
             sys.unraisablehook = hook
     raise InputError(f"{refusal} ({reason})")
