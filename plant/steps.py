@@ -134,13 +134,15 @@ class Periods:
         history: np.ndarray,
         tensions: np.ndarray,
         means: np.ndarray | None = None,
+        count: int = 1,
     ) -> None:
-        """Write states and tensions at the beginning and at the end of a period, and the mean tensions in it.
+        """Write states and tensions at the beginning and at the end of some periods, and the mean tensions in them.
 
-        - `states`, `commands`: (N, n) and (N, K, k), see `Plant`: the first command belongs to the period; carriers
-          move on to a second.
+        - `states`, `commands`: (N, n) and (N, K, k), see `Plant`: each period has a command; carriers move on to
+          another.
+        - `count`: number of periods.
         - `history`, `tensions`: results, (N, 2, n) and (N, 2, m) [N].
         - `means`: results, (N, m) [N], with which the momentum of the bodies changes but for impacts.
         """
         of_rows = (states, commands, history, tensions, means)
-        run_plant(self.record, self._settings, *of_rows, 1, self.period, self._substeps, 1)
+        run_plant(self.record, self._settings, *of_rows, count, self.period, self._substeps, count)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
+from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -217,6 +219,7 @@ class Windows:
             # Stiff cables feel where straight lines cut corners, and a platform the impulse that these miss.
             even = smooth(of.times, self._command, self._neighbours) if self.measured_command else self._command
             self._signal = spline_of(of.times, even)
+        self._late_by = lru_cache(1)(self._late)  # while other parameters are fitted
         dynamics = dynamics_of(self.robot)
         lengths = np.asarray(dynamics.cable_lengths(self._platform[0], carriers))
         self._cable_speed = np.gradient(lengths, self._dt, axis=1)
@@ -226,8 +229,11 @@ class Windows:
         at_starts = self.robot, of, self.starts, lengths[:, 0], balance, forces, self.usual_tension
         self._tensions = StartTensions(*at_starts)
 
-    def _driven(self, at: np.ndarray) -> np.ndarray:
-        """Return the tensions or forces of the drives at times (W, K) with equal steps [s], (W, K, m) [N]."""
+    def _late(self, delay: float) -> np.ndarray:
+        """Return lengths at the ends of all steps (W, K + 1, m) [m], or the drives' tensions or forces in these [N]."""
+        if self.drive == "lengths":
+            return self._signal(self._grid - delay)
+        at = self._grid[:, :-1] + 0.5 * self._dt - delay
         if self.measured_command or self.drive == "forces":
             return self._signal(at)
         before = round(2 * MARGIN / self._dt)
@@ -299,24 +305,26 @@ class Windows:
         number = np.clip(np.floor(at).astype(int), 0, steps - 1)
         history, tensions = np.zeros((count * W, 2, plant.size)), np.zeros((count * W, 2, m))
         seen = [np.zeros((count, *self.rows.shape, part.shape[-1])) for part in (history, tensions)]
-        commands = np.zeros((count, W, 2, rows.shape[-1]))
         periods = Periods(plant, dt, substeps)
+        # Only periods with samples, and those of carriers that turn, are run alone.
+        stops = np.arange(steps + 1) if self._attitudes else np.unique([0, *number.ravel(), *(number.ravel() + 1)])
         with np.errstate(all="ignore"):
-            for k in range(steps):
+            for k, end in pairwise(stops.tolist()):
                 # Flown carriers turn as recorded: a thrust is known, the torques behind an attitude rarely are.
                 for index, attitude in self._attitudes.items():
-                    body = states[:, layout.BODY * (1 + index) : layout.BODY * (2 + index)]
-                    body[:, layout.QUATERNION : layout.VELOCITY] = np.tile(attitude[:, k, :4], (count, 1))
-                    body[:, layout.RATE :] = np.tile(attitude[:, k, 4:], (count, 1))
-                commands[:] = rows[:, k : k + 2]
-                commands[:, :, 0, layout.COMMANDS : layout.COMMANDS + m] = cables[:, :, k]
-                periods.run(states, commands.reshape(count * W, 2, -1), history, tensions)
+                    body = states.reshape(count, W, -1)[..., layout.BODY * (1 + index) : layout.BODY * (2 + index)]
+                    body[..., layout.QUATERNION : layout.VELOCITY] = attitude[:, k, :4]
+                    body[..., layout.RATE :] = attitude[:, k, 4:]
+                commands = rows[None, :, k : end + 1].repeat(count, axis=0)
+                commands[:, :, :-1, layout.COMMANDS : layout.COMMANDS + m] = cables[:, :, k:end]
+                commands = commands.reshape(count * W, end + 1 - k, -1)
+                periods.run(states, commands, history, tensions, count=end - k)
                 w, s = np.nonzero(number == k)
                 if len(w):
                     share = (at[w, s] - k)[:, None]
-                    for part, ends in zip(seen, (history, tensions), strict=True):
-                        ends = ends.reshape(count, W, 2, -1)[:, w]
-                        part[:, w, s] = (1 - share) * ends[:, :, 0] + share * ends[:, :, 1]
+                    for part, both in zip(seen, (history, tensions), strict=True):
+                        both = both.reshape(count, W, 2, -1)[:, w]
+                        part[:, w, s] = (1 - share) * both[:, :, 0] + share * both[:, :, 1]
                 states[:] = history[:, 1]
         if self.drive == "tensions":  # each is held for a step, in the middle of which it is right
             before = np.clip(np.floor(at - 0.5).astype(int), 0, steps - 2)[..., None]
@@ -330,12 +338,11 @@ class Windows:
 
     def _commands(self, plant: Plant, with_: Parameters, own: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return commands as rows, (W, K + 1, k), and the numbers of the cables in them, (V, W, K, m)."""
-        middle = self._grid + 0.5 * self._dt - with_.delay
+        middle, commanded = self._grid + 0.5 * self._dt - with_.delay, self._late_by(with_.delay)
         if self.drive == "lengths":
-            along = self._signal(self._grid - with_.delay)  # (W, K + 1, m)
-            cables = np.maximum(own[:, :, None] + along[:, 1:] - along[:, :1], layout.SHORTEST)
+            cables = np.maximum(own[:, :, None] + commanded[:, 1:] - commanded[:, :1], layout.SHORTEST)
         else:
-            pulls, friction = self._driven(middle[:, :-1]), with_.friction + np.array(with_.cable_friction)
+            pulls, friction = commanded, with_.friction + np.array(with_.cable_friction)
             if self.measured_command:
                 gains, zeros = cells_of(with_, self.usual_tension)
                 pulls = (pulls - zeros) / gains
