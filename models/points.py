@@ -84,6 +84,16 @@ def in_frame(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
     return np.einsum("...ij,...i->...j", rotations(pose[..., 3:]), points - pose[..., :3])
 
 
+def moved(pose: np.ndarray, step: np.ndarray, point: Any = (0.0, 0.0, 0.0)) -> np.ndarray:
+    """Return poses moved by displacements of a `point` of the platform and rotation vectors in {G}, (..., 6) each."""
+    from scipy.spatial.transform import Rotation
+
+    pose, step = np.broadcast_arrays(pose, step)
+    R = rotations(pose[..., 3:])
+    turned = Rotation.from_rotvec(np.array(step[..., 3:]).reshape(-1, 3)).as_matrix().reshape(R.shape) @ R
+    return np.concatenate([pose[..., :3] + step[..., :3] + (R - turned) @ np.array(point), angles(turned)], axis=-1)
+
+
 def anchors(robot: Any, carrier_pose: np.ndarray) -> np.ndarray:
     """Place the anchors of a robot into {G}, with its carriers at `carrier_pose` (..., c, 6), (..., m, 3) [m]."""
     owner, points = robot.carrier_of_cable, robot.anchors

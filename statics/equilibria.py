@@ -17,7 +17,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..base.display import Displayed
 from ..base.inputs import InputError, finite_array, required, whole_number
@@ -128,7 +127,7 @@ def descend(robot: Robot, start: np.ndarray, carriers: np.ndarray, longest: np.n
             return replace(candidate, neutral=bool(np.abs(frequencies).min(initial=np.inf) < UNSTABLE))
         mode = modes[:, 0]
         motion = max(np.linalg.norm(mode[:3]) / robot.length, np.linalg.norm(mode[3:]))  # in robot lengths, radians
-        start = displaced(pose, 0.1 * mode / motion, np.array(robot.platform.com))
+        start = points.moved(pose, 0.1 * mode / motion, robot.platform.com)
     return None
 
 
@@ -175,13 +174,6 @@ def judge(
     com = pose[..., :3] + points.rotations(pose[..., 3:]) @ np.array(robot.platform.com)
     energy = -robot.platform.mass * (com @ np.array(robot.gravity))
     return Equilibrium(pose, tensions, dynamics.cable_lengths(pose, carriers), energy, missing)
-
-
-def displaced(pose: np.ndarray, twist: np.ndarray, com: np.ndarray) -> np.ndarray:
-    """Return poses after small displacements of the CoM and rotation vectors, (..., 6) each, in {G}."""
-    R = points.rotations(pose[..., 3:])
-    turned = Rotation.from_rotvec(twist[..., 3:]).as_matrix() @ R
-    return np.concatenate([pose[..., :3] + twist[..., :3] + (R - turned) @ com, points.angles(turned)], axis=-1)
 
 
 def _same(robot: Robot, one: Equilibrium, other: Equilibrium) -> bool:
@@ -244,7 +236,7 @@ def _newton(
 ) -> tuple[Equilibrium, np.ndarray]:
     """Return the equilibria that Newton's method reaches, and which of them are stable, (N,)."""
     dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
-    n, unit, com = len(rows), _unit(robot), np.array(robot.platform.com)
+    n, unit = len(rows), _unit(robot)
     weight = (robot.platform.mass * np.array([*robot.gravity, 0.0, 0.0, 0.0]) * robot.wrench_scale)[rows] / unit
     pose = starts.copy()
     A = (dynamics.wrench_matrix(pose, carriers) * robot.wrench_scale[:, None])[:, rows]
@@ -265,7 +257,7 @@ def _newton(
         size = np.linalg.norm(step[:, :n], axis=1) / robot.length
         twist = np.zeros((len(left), 6))
         twist[:, rows] = step[:, :n] * robot.wrench_scale[rows] * np.minimum(1.0, 0.3 / np.maximum(size, 0.3))[:, None]
-        pose[left] = displaced(pose[left], twist, com)
+        pose[left] = points.moved(pose[left], twist, robot.platform.com)
         pulls = step[:, n:] * unit
         far = size > 1e-3
         tensions[left] = np.where(far[:, None], np.maximum(pulls, 0.0), pulls)

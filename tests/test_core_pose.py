@@ -7,7 +7,7 @@ import pytest
 
 from towline import available, load
 from towline.core import one_pose_from_lengths, pose_covariance, pose_from_lengths
-from towline.estimation.pose.estimate import moved
+from towline.models import points
 from towline.models.dynamics import dynamics_of
 from towline.models.record import record_of
 
@@ -84,7 +84,7 @@ def test_the_curvature_is_that_of_the_lengths(program, name):
         factors = (dynamics.cable_lengths(poses[row], carriers[row]) - lengths[row]) * weights**2
 
         def weighted(step, row=row, factors=factors):
-            return factors @ dynamics.cable_lengths(moved(poses[row], step), carriers[row])
+            return factors @ dynamics.cable_lengths(points.moved(poses[row], step), carriers[row])
 
         expected = np.zeros((6, 6))
         for j, a in enumerate(steps):

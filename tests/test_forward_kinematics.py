@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2, ncx2
 
 from towline import InputError, Robot, available, core, load, solve_batch
-from towline.estimation.pose.estimate import gradient, moved
+from towline.estimation.pose.estimate import gradient
 from towline.estimation.pose.search import problem_of
 from towline.estimation.pose.wrong_lengths import wrong_cables
 from towline.models import branches, points, pose_from_lengths
@@ -157,7 +157,7 @@ def test_the_gradient_is_that_of_the_lengths(name):
     dynamics = dynamics_of(robot)
     pose = robot.home + 0.1 * np.array([1, -1, 0.5, 0.8, -0.5, 1]) * robot.dof_mask
     steps = 1e-6 * np.eye(6) * robot.dof_mask
-    change = dynamics.cable_lengths(moved(pose, steps)) - dynamics.cable_lengths(moved(pose, -steps))
+    change = dynamics.cable_lengths(points.moved(pose, steps)) - dynamics.cable_lengths(points.moved(pose, -steps))
     np.testing.assert_allclose(gradient(robot, pose, None), change.T / 2e-6, atol=1e-8)
 
 
@@ -440,7 +440,7 @@ def test_steps_converge_where_errors_are_large(name):
     )
     assert np.median(steps[steps > 0]) <= 5
     shifts = np.vstack([np.eye(6), -np.eye(6)]) * 1e-3 * robot.dof_mask
-    around = dynamics.cable_lengths(moved(poses[:, None], shifts)) - lengths[:, None]
+    around = dynamics.cable_lengths(points.moved(poses[:, None], shifts)) - lengths[:, None]
     cost = np.sum((dynamics.cable_lengths(poses) - lengths) ** 2, axis=-1)
     assert (np.sum(around**2, axis=-1) >= cost[:, None] * (1 - 1e-12)).all()
 

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from towline.base.errors import InputError
-from towline.models import Dynamics, Robot, load
+from towline.models import Dynamics, Robot, load, points
 from towline.statics.equilibria import equilibria
 
 from .framed import framed
@@ -324,3 +324,13 @@ def test_only_dof_whose_equations_are_the_wrench_rows():
             hanging([([0, 0, 1], [0.1, 0, 0])], dof=dof)
     with pytest.raises(InputError, match=r"home must have 0 rad for roll, yaw, which cannot move, got 0\.1, 0"):
         hanging([([0, 0, 1], [0.1, 0, 0])], dof=["x", "z", "pitch"], home=[0, 0, 0, 0.1, 0, 0])
+
+
+def test_a_turn_about_a_point_leaves_it_where_the_displacement_takes_it():
+    rng = np.random.default_rng(3)
+    pose, step, point = rng.uniform(-1, 1, (4, 1, 6)), rng.uniform(-1, 1, (5, 6)), rng.uniform(-1, 1, 3)
+    after = points.moved(pose, step, point)
+    arrived = points.placed(pose, point[None])[..., 0, :] + step[:, :3]
+    np.testing.assert_allclose(points.placed(after, point[None])[..., 0, :], arrived, atol=1e-12)
+    turned = Rotation.from_rotvec(step[:, 3:]).as_matrix() @ points.rotations(pose[..., 3:])
+    np.testing.assert_allclose(points.rotations(after[..., 3:]), turned, atol=1e-12)

@@ -181,7 +181,7 @@ class PoseEstimate(Displayed):
         steps = 2.0 * np.swapaxes(axes * np.sqrt(np.maximum(values, 0.0))[..., None, :], -1, -2)  # (..., 6, 6), rows
         linear = np.einsum("...cj,...kj->...kc", self._weighted_gradient(), steps)
         lengths = self._lengths_at(self.pose)[..., None, :]
-        change = (self._lengths_at(moved(self.pose[..., None, :], steps)) - lengths) / self.sigma
+        change = (self._lengths_at(points.moved(self.pose[..., None, :], steps)) - lengths) / self.sigma
         curved = np.linalg.norm(change - linear, axis=-1) > MOST_CURVED * np.linalg.norm(linear, axis=-1)
         some = np.linalg.norm(linear, axis=-1) > 1e-6  # none for coordinates that cannot move
         small = np.sqrt(np.linalg.eigvalsh(believed[..., 3:, 3:]).max(axis=-1)) <= MOST_TURN
@@ -255,13 +255,3 @@ def gradient(robot: Robot, pose: np.ndarray, carrier_pose: np.ndarray | None) ->
     arm = np.einsum("...ij,j->...i", points.rotations(pose[..., 3:]), np.array(robot.platform.com))
     moments = A[..., 3:, :] + np.cross(arm[..., :, None], A[..., :3, :], axis=-2)
     return -np.swapaxes(np.concatenate([A[..., :3, :], moments], axis=-2) * robot.dof_mask[:, None], -1, -2)
-
-
-def moved(pose: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """Return a pose, (..., 6), moved by a displacement and turned by a rotation vector in {G}, (..., 6)."""
-    from scipy.spatial.transform import Rotation
-
-    pose, step = np.broadcast_arrays(pose, step)
-    turn = Rotation.from_rotvec(np.array(step[..., 3:]).reshape(-1, 3)).as_matrix().reshape(*pose.shape[:-1], 3, 3)
-    angles = points.angles(turn @ points.rotations(pose[..., 3:]))
-    return np.concatenate([pose[..., :3] + step[..., :3], angles], axis=-1)

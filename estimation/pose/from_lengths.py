@@ -15,7 +15,7 @@ from ...models.files import AnyRobot, as_robot
 from ...models.part import LARGEST
 from ...models.robot import Robot
 from ...statics.equilibria import Equilibrium, equilibria, rests_near, sensitivity
-from .estimate import PoseEstimate, moved, unbounded
+from .estimate import PoseEstimate, unbounded
 from .residual_tests import length_errors
 from .search import Problem, estimates, problem_of
 
@@ -201,7 +201,7 @@ def _motions(robot: Robot, rests: Equilibrium, lengths: np.ndarray, carriers: np
     """
     by_length, compliance, neutral = sensitivity(robot, rests, carriers)
     step = STEP * np.diag([robot.length] * 3 + [1.0] * 3)
-    around = moved(rests.pose[:, None], np.vstack([np.zeros(6), step, -step]))  # (N, 13, 6)
+    around = points.moved(rests.pose[:, None], np.vstack([np.zeros(6), step, -step]))  # (N, 13, 6)
     flat = around.reshape(-1, 6), np.repeat(lengths, 13, axis=0), np.repeat(carriers, 13, axis=0)
     L, _ = length_errors(robot, *flat)
     L = L.reshape(len(lengths), 13, *L.shape[1:])

@@ -19,7 +19,7 @@ from ...core import pose_from_lengths as descend
 from ...models import points
 from ...models.record import record_of
 from ...models.robot import Robot
-from .estimate import EXACT, PoseEstimate, gradient, largest_cost, moved
+from .estimate import EXACT, PoseEstimate, gradient, largest_cost
 from .residual_tests import squares_of
 from .taut import taut
 
@@ -169,14 +169,14 @@ def _starts(problem: Problem, level: np.ndarray):
             for sign in (1.0, -1.0):
                 step = np.zeros(6)
                 step[3 + axis] = sign * turn
-                yield moved(level, step)
+                yield points.moved(level, step)
     if problem.robot.m == problem.freedoms == 6:
         for turn in OBLIQUE:
             for one, other in combinations(range(3, 6), 2):
                 for signs in product((1.0, -1.0), repeat=2):
                     step = np.zeros(6)
                     step[[one, other]] = turn * np.sqrt(0.5) * np.array(signs)
-                    yield moved(level, step)
+                    yield points.moved(level, step)
 
 
 def estimates(problem: Problem, lengths: np.ndarray, starts: np.ndarray | None, sigma: np.ndarray) -> PoseEstimate:
