@@ -280,15 +280,14 @@ class Dynamics(Displayed):
             if (largest := np.abs(array).max()) > LARGEST:
                 raise InputError(f"{name} must be numbers up to {LARGEST:g}, got {largest:g}")
         K = self.stiffness(pose, tensions, carrier_pose, elastic=elastic)
-        rows = np.flatnonzero(self.robot.dof_mask)
-        free = np.eye(6)[:, rows]
+        rows, C = np.flatnonzero(self.robot.dof_mask), elasticity.whitening(self.robot, pose)
+        free = C.T  # twists, one a column
         if not elastic:
             taut = tensions > 1e-9 * max(tensions.max(initial=0.0), 1e-300)
-            A = self.wrench_matrix(pose, carrier_pose)[rows][:, taut]
-            U, sigma, _ = np.linalg.svd(A)
-            rank = int((sigma > 1e-9 * sigma.max(initial=1e-300)).sum())
-            free = free @ U[:, rank:]
-        return elasticity.frequencies(K, elasticity.spatial_inertia(self.robot, pose), free)
+            U, sigma, _ = np.linalg.svd(C @ self.wrench_matrix(pose, carrier_pose)[rows][:, taut])
+            free = C.T @ U[:, int((sigma > 1e-9 * sigma.max(initial=1e-300)).sum()) :]
+        squares, modes = np.linalg.eigh(elasticity.whitened(self.robot, K, free.T))
+        return elasticity.frequency(squares), np.eye(6)[:, rows] @ free @ modes
 
     @cached_property
     def relative(self) -> RelativeDynamics:

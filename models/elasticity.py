@@ -54,15 +54,6 @@ def cable_stiffness(robot: Robot, A: Matrix, lengths: Matrix, tensions: Matrix) 
     return A @ ca.diag(k) @ A.T
 
 
-def spatial_inertia(robot: Robot, pose: np.ndarray) -> np.ndarray:
-    """Return blockdiag(m, I) about the CoM in {G}, (..., 6, 6) [kg, kg m^2], at poses (..., 6)."""
-    R = points.rotations(pose[..., 3:])
-    M = np.zeros((*pose.shape[:-1], 6, 6))
-    M[..., :3, :3] = robot.platform.mass * np.eye(3)
-    M[..., 3:, 3:] = R @ robot.inertia @ R.swapaxes(-1, -2)
-    return M
-
-
 def whitening(robot: Robot, pose: np.ndarray) -> np.ndarray:
     """Return C with C M C^T = 1 in the coordinates that move, (..., k, k), at poses (..., 6).
 
@@ -97,14 +88,3 @@ def frequency(square: ArrayLike) -> np.ndarray:
     An unstable motion has a negative frequency: minus the rate of growth over 2 pi.
     """
     return np.sign(square) * np.sqrt(np.abs(square)) / (2 * np.pi)
-
-
-def frequencies(K: np.ndarray, M: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return natural frequencies [Hz], ascending, and modes as twists, (6, k), of motions in the span of `free`."""
-    from scipy.linalg import eigh
-
-    if free.shape[1] == 0:
-        return np.zeros(0), np.zeros((6, 0))
-    symmetric = (K + K.T) / 2  # at an equilibrium K is symmetric; rounding and residual wrenches are cut off here
-    squares, modes = eigh(free.T @ symmetric @ free, free.T @ M @ free)
-    return frequency(squares), free @ modes
