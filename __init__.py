@@ -48,21 +48,8 @@ _HOMES = {
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 # Reached as attributes. The last two are short names that stay.
 _PACKAGES = {
-    *(
-        "base",
-        "control",
-        "core",
-        "estimation",
-        "export",
-        "figures",
-        "layout",
-        "models",
-        "ocp",
-        "plant",
-        "simulation",
-        "solvers",
-    ),
-    *("benchmarks", "cli", "statics", "studies", "viewer", "workspace", "calibration", "errors"),
+    *("base", "benchmarks", "calibration", "cli", "control", "core", "errors", "estimation", "export", "figures"),
+    *("layout", "models", "ocp", "plant", "simulation", "solvers", "statics", "studies", "viewer", "workspace"),
 }
 
 __all__ = [

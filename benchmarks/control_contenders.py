@@ -35,15 +35,6 @@ BLOCKS = 10  # of stages, after condensing
 ITERATIONS = 100
 TOLERANCE = 1e-6
 LIBRARIES = ("libblasfeo.so", "libhpipm.so", "libqpOASES_e.so.3.1", "libqpOASES_e.so")  # that acados needs
-MAKERS = {
-    "ocp_qp_xcond_solver_config_create",
-    "ocp_qp_dims_create",
-    "ocp_qp_xcond_solver_dims_create_from_ocp_qp_dims",
-    "ocp_qp_xcond_solver_opts_create",
-    "ocp_qp_in_create",
-    "ocp_qp_out_create",
-    "ocp_qp_create",
-}
 
 
 class Program(NamedTuple):
@@ -279,12 +270,12 @@ def _acados(first: Program) -> Solver:
     needed = [CDLL(str(place / name), mode=RTLD_GLOBAL) for name in LIBRARIES if (place / name).is_file()]
     hpipm = next(library for library in needed if "hpipm" in library._name)
     acados = CDLL(str(place / "libacados.so"), mode=RTLD_GLOBAL)
-    for name in MAKERS:
-        getattr(acados, name).restype = c_void_p
     N, n, m = first.B.shape
 
     def make(name: str, *given: Any) -> c_void_p:
-        return c_void_p(getattr(acados, name)(*given))
+        function = getattr(acados, name)
+        function.restype = c_void_p
+        return c_void_p(function(*given))
 
     config, dims = make("ocp_qp_xcond_solver_config_create", _Plan(0)), make("ocp_qp_dims_create", N)
     sizes = [("nx", n, n), ("nu", m, 0), ("nbx", 0, 0), ("nbu", m, 0)]

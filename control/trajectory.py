@@ -121,7 +121,6 @@ def _of_path(robot: Robot, path: Any, duration: float | None) -> Trajectory:
 
 
 def _resting(motion: Any, times: np.ndarray, end: float) -> Motion:
-    """Return a motion that rests after its end."""
     pose, velocity, acceleration = (np.array(part) for part in motion)
     velocity[times > end] = acceleration[times > end] = 0.0
     return pose, velocity, acceleration

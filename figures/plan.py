@@ -100,7 +100,6 @@ def _same_scale(panels: list[style.Axes]) -> None:
 
 
 def _draw_tensions(ax: style.Axes, trajectory: xr.Dataset) -> None:
-    """Draw one panel."""
     time = trajectory["time"].values
     values, unlimited = trajectory["tensions"].values, trajectory["tensions_unlimited"].values
     missing = ~np.isfinite(values).all(axis=1)

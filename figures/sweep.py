@@ -112,7 +112,6 @@ def _maps(
 
 
 def _range(values: np.ndarray) -> tuple[float, float]:
-    """Return the range of the colours."""
     known = values[np.isfinite(values)]
     return (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
 

@@ -29,9 +29,9 @@ def limit_rate(problem: TensionProblem, previous: ArrayLike, rate_max: ArrayLike
     """
     required("problem", problem, TensionProblem)
     at, step = repeated("previous", previous, problem.m), repeated("rate_max", rate_max, problem.m)
-    if not (step >= 0.0).all() or not np.isfinite(at).all():
-        if np.isfinite(at).all():
-            raise InputError(f"rate_max must be numbers >= 0 [N per call], got {step.min():g}")
+    if not np.isfinite(at).all():
         raise InputError(f"previous must be finite tensions [N], got {shown(at.tolist())}")
+    if not (step >= 0.0).all():
+        raise InputError(f"rate_max must be numbers >= 0 [N per call], got {step.min():g}")
     lower, upper = (np.clip(limit, at - step, at + step) for limit in (problem.t_min, problem.t_max))
     return TensionProblem(problem.A, problem.w, lower, upper, problem.t_ref, problem.weights, problem.length)

@@ -24,7 +24,6 @@ class MotionResult(Drawn):
 
     @property
     def _of_robot(self) -> Robot:
-        """Return the robot that moves."""
         raise NotImplementedError
 
     @cached_property

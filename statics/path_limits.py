@@ -9,8 +9,6 @@ plan need in addition to c: r = 1 and u = 0 are the plan itself. Each facet of t
 (`solvers.available_wrench`) therefore bounds u at each tau and r.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple, TypeAlias
 

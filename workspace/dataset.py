@@ -7,34 +7,29 @@ again without evaluating the condition.
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base import processors
+from ..base.display import Displayed
 from ..base.inputs import InputError, check_ending, file_path, required
 from ..base.netcdf import Contents, save_netcdf
 from ..base.writing import whole_folder
-from .domain import Domain
-from .metrics import METRICS
+from .condition import Condition, Places
+from .domain import THINNEST, Domain
+from .metrics import METRICS, metric_values
 from .refinement import Refinement
-from .sampling import CHUNK
+from .sampling import CHUNK, Sampler
 from .volume import LEVEL, share_interval
 
 if TYPE_CHECKING:
     import xarray as xr
-
-import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
-
-from ..base import processors
-from ..base.display import Displayed
-from .condition import Condition, Places
-from .domain import THINNEST
-from .metrics import metric_values
-from .sampling import Sampler
 
 RESOLUTION = 32  # cells along each axis
 METRES = {"units": "m"}
@@ -235,7 +230,6 @@ def _boundary(domain: Domain, refinement: Refinement) -> dict[str, Any]:
 
 
 def _volume(counts: Counts, domain: Domain, method: str, refinement: Refinement | None) -> dict[str, Any]:
-    """Return the volume and its interval."""
     ends = np.nan, np.nan
     if refinement is not None:
         ends = refinement.inside, refinement.inside + refinement.mixed

@@ -159,7 +159,6 @@ def displaced_frames(log: LogPart, least: float, noise: float) -> tuple[Frames, 
 
 
 def _few(log: LogPart) -> LogPart:
-    """Return some samples of a log."""
     omitted = np.ones(len(log.y), dtype=bool)
     omitted[np.linspace(0, len(log.y) - 1, min(len(log.y), MOST_SAMPLES)).astype(int)] = False
     return log.without(omitted)

@@ -1,7 +1,5 @@
 """`AtRest`: by how much a robot at rest keeps its task's limits, for many poses in one call."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple

@@ -174,7 +174,6 @@ def derivatives(
 
 
 def _matrix(entries: Sequence[_Entries], height: int, width: int) -> ca.MX:
-    """Return the sparse matrix of these entries."""
     rows, columns = (np.concatenate([getattr(each, part) for each in entries]) for part in ("rows", "columns"))
     places, first, which = np.unique(columns * height + rows, return_index=True, return_inverse=True)
     values = ca.vertcat(*(each.values for each in entries))

@@ -211,7 +211,6 @@ def _as_parameters(shape: tuple[int, int], steps: int) -> tuple[ca.MX, ca.MX, ca
 
 
 def _values(references: np.ndarray, step: float) -> np.ndarray:
-    """Return the values of these parameters."""
     return np.append(references.ravel(order="F"), step)
 
 

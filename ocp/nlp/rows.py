@@ -1,7 +1,5 @@
 """Define what the parts of a program share: its mesh, its rows, and the motions that its unknowns stand for."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple

@@ -72,7 +72,6 @@ def _unless(
 
 
 def _spans(scenario: Scenario, rests: np.ndarray) -> Iterator[_Span]:
-    """Yield the longest spans."""
     phases = scenario.phases.all
     if not phases:
         if rests[:, 0].all():

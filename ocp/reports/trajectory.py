@@ -10,7 +10,7 @@ import numpy as np
 from ...base.netcdf import Contents, Variable
 from ...figures import plan as plan_figures
 from ...figures.drawing import Drawing
-from ...figures.limits import limits
+from ...figures.limits import Limited, limits
 from ...figures.plan import convergence, phase_plane
 from ...figures.scene import outline_variables
 from ...figures.views import views
@@ -26,7 +26,6 @@ from ..tasks.wind_set import WindBox, WindDisc
 
 if TYPE_CHECKING:
     import xarray as xr
-from ...figures.limits import Limited
 
 ROUND = np.linspace(0.0, 2 * np.pi, 41)
 INSTANTS = 60  # along the carriers' paths in the views

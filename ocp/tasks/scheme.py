@@ -14,8 +14,6 @@ them only as exactly as the polynomial follows a motion that is possible. There 
 balances per interval with a quadratic is far smaller than that of one balance with a line.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

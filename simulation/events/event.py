@@ -197,7 +197,6 @@ def _from_data(data: dict[str, Any], where: str, folder: Path | None) -> Event:
 
 
 def _accepted() -> str:
-    """Return what is accepted."""
     last = {event: "duration" in event.model_fields and event.said != "duration" for event in Event.kinds.values()}
     lines = [f"'{event.short} at SECONDS{' [for SECONDS]' * lasts}'" for event, lasts in last.items() if event.short]
     return f"{', '.join(lines)}, a mapping with a kind, or a YAML file with the list `events` of these"

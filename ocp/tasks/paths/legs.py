@@ -157,7 +157,6 @@ class Legs:
         return leg, first, second
 
     def _motion(self, leg: np.ndarray, first: Progress, second: Progress) -> Motion:
-        """Return the motion of a progress."""
         steps = self._steps[:, :3]
         pose, velocity, acceleration = (
             first[k][:, None] * steps[leg] + second[k][:, None] * steps[leg + 1] for k in range(3)
