@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,7 +13,7 @@ from ..base.display import Displayed, tensions_over_time
 from ..solvers import Certificate
 from ..statics.robust import RobotShare, share_of_robots
 from .audits.audit import Audit
-from .audits.phase_summary import PhaseSummary, infeasible_spans, summaries
+from .audits.by_phase import worst_certificate
 from .audits.waypoint_distance import WaypointDistance, waypoint_distance
 from .tasks.deviation import Deviation
 from .tasks.scenario import Scenario
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 DRAWN_AT = 200  # times at which drawn robots are checked
 MOST_WARNED = 100_000  # times that are looked at for warnings, or less than twice as many
+MOST_SPANS = 8
 
 
 class PlannerStep(NamedTuple):
@@ -43,6 +44,20 @@ class Offers(NamedTuple):
 
     found: Sequence[Relaxed] = ()
     cut_short: bool = False
+
+
+class PhaseSummary(NamedTuple):
+    """A phase of a motion."""
+
+    name: str
+    start: float  # [s]
+    end: float
+    load: float  # the mass that the platform carries [kg]
+    # smallest and largest audited tension [N]; None if none exist at some time, or none were evaluated
+    tension_min: float | None
+    tension_max: float | None
+    # the largest sum of the forces of the ground [N]; None for a phase without ground, or without tensions
+    reaction_max: float | None
 
 
 @dataclass(frozen=True)
@@ -202,13 +217,38 @@ class PlanData(Displayed):
 
     @cached_property
     def infeasible_spans(self) -> tuple[Certificate, ...]:
-        """Return a certificate for each span of time without tensions inside their limits."""
-        return infeasible_spans(self.scenario, self.audit)
+        """Return a certificate of the worst instant of each span without tensions, in order of time.
+
+        The certificate's `span` holds the first and the last audited instant of the span [s], its `time` the worst one.
+        If there are more than `MOST_SPANS` spans, the worst are returned.
+        """
+        audit = self.audit
+        short = np.concatenate([[False], audit.violation > audit.tolerance, [False]])
+        edges = np.flatnonzero(short[1:] != short[:-1]).reshape(-1, 2)  # first row, and the one after the last
+        edges = sorted(edges.tolist(), key=lambda edge: -audit.violation[slice(*edge)].max())[:MOST_SPANS]
+        certificates = []
+        for first, after in sorted(edges):
+            row = first + int(audit.violation[first:after].argmax())
+            time, platform = float(audit.times[row]), audit.motion.at(row)
+            certificate = worst_certificate(self.scenario, time, platform, audit.carriers.pose[row])
+            if certificate is not None:
+                span = (float(audit.times[first]), float(audit.times[after - 1]))
+                certificates.append(replace(certificate, time=time, span=span))
+        return tuple(certificates)
 
     @cached_property
     def phases(self) -> tuple[PhaseSummary, ...]:
         """Return name, times, load, tensions and ground reaction of each phase; empty for a task without phases."""
-        return summaries(self.scenario, self.audit)
+        result, audit, phases = [], self.audit, self.scenario.phases
+        for index, phase in enumerate(phases.all):
+            tensions = audit.tensions[rows := phases.index_at(audit.times) == index]
+            there = bool(tensions.size and np.isfinite(tensions).all())  # shown instants may step over a short phase
+            extremes = (float(tensions.min()), float(tensions.max())) if there else (None, None)
+            reaction = None
+            if phase.rests and there and audit.supports is not None:
+                reaction = float(audit.supports[rows].sum(axis=1).max())
+            result.append(PhaseSummary(phase.name, phase.start, phase.end, float(phase.load[0]), *extremes, reaction))
+        return tuple(result)
 
     def share_of_robots(self, count: int = 200, seed: int = 0) -> RobotShare:
         """Sample robots from the uncertainty, and check whether each has tensions inside its limits along the motion.

@@ -12,8 +12,7 @@ from .derivatives import sensitivity
 from .horizon import Horizon, Multipliers, Residuals
 from .margin import Margin, capacity_margin
 from .methods.method import Method, Proposal
-from .problem import TensionProblem
-from .rate import limit_rate
+from .problem import TensionProblem, limit_rate
 from .solution import Status, TensionSolution
 from .solve import methods, solve
 from .standard_form import StandardForm

@@ -11,7 +11,7 @@ from towline import InputError, load, plan, simulate
 from towline.cli.main import app
 from towline.control import ComputedTorque, Controller, references
 from towline.control.open_loop import planned_command
-from towline.simulation.drives import Drives
+from towline.simulation.command_conversion import Drives
 from towline.simulation.flights import report, summary
 from towline.simulation.mismatch import Mismatch
 from towline.workspace.volume import share_interval

@@ -7,9 +7,8 @@ from . import conditions
 from .boundary_mesh import boundary
 from .condition import AllOf, AnyOf, Condition, Places, TensionCondition, condition_from
 from .conditions import *  # noqa: F403  the only list of them is there
-from .dataset import save
+from .dataset import draw, save
 from .metrics import METRICS, metric_values
-from .picture import draw
 from .region import Region
 from .run import sample
 

@@ -1,4 +1,4 @@
-"""The dataset of a run (counts, samples, volume and boundary with names and units), its files, and its `Counts`.
+"""The dataset of a run (counts, samples, volume and boundary with units), its files and figure, and its `Counts`.
 
 The result does not depend on the process, to the last bit. Chunks with known flags, from a checkpoint, are counted
 again without evaluating the condition.
@@ -18,9 +18,10 @@ import numpy as np
 
 from ..base import processors
 from ..base.display import Displayed
-from ..base.inputs import InputError, check_ending, file_path, required
+from ..base.inputs import InputError, check_ending, file_path, required, shown
 from ..base.netcdf import Contents, save_netcdf
 from ..base.writing import whole_folder
+from ..models.files import AnyRobot, as_robot
 from .condition import Condition, Places
 from .domain import THINNEST, Domain
 from .metrics import METRICS, metric_values
@@ -30,6 +31,7 @@ from .volume import LEVEL, share_interval
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
 RESOLUTION = 32  # cells along each axis
 METRES = {"units": "m"}
@@ -250,3 +252,25 @@ def _volume(counts: Counts, domain: Domain, method: str, refinement: Refinement 
         "volume": ((), domain.measure * value, unit),
         "volume_interval": (("end",), [domain.measure * end for end in ends], {**unit, "long_name": about}),
     }
+
+
+def draw(result: xr.Dataset, robot: AnyRobot | None = None) -> Figure:
+    """Draw the metrics of a workspace as contours, or, if it has none, where samples were accepted.
+
+    Args:
+        result: A result of `sample`.
+        robot: The robot whose anchors are drawn as triangles (default: none).
+
+    Raises:
+        InputError: If an argument has a wrong type, or the result is not one of `sample`.
+    """
+    import xarray as xr
+
+    from ..figures.workspace import metric_map, reached
+
+    required("result", result, xr.Dataset)
+    if "reached" not in result:
+        raise InputError(f"result must be a result of sample, got a dataset with {shown(list(result.data_vars))}")
+    anchors = None if robot is None else as_robot(robot).home_anchors
+    metrics = [str(name) for name in result.data_vars if name in METRICS]
+    return metric_map(result, metrics, anchors) if metrics else reached(result, anchors)

@@ -13,10 +13,9 @@ from .geometry import length_of
 from .parameters import GROUPS, IN_BALANCE, check_free, check_prior
 from .plausibility import mistake
 from .representative import representative
-from .sensor_mount import is_askew, with_mount
+from .sensor_errors import has_zeros, is_askew, with_mount, with_zeros
 from .solving import solve
 from .stretch import is_elastic, uses_slack, with_elasticity, with_stretch
-from .zeros import has_zeros, with_zeros
 
 ROUNDS_OF_STRETCH = 2  # without and with further parameters of the geometry
 ROUNDS_OF_SLACK = 3

@@ -17,8 +17,7 @@ from ..tasks.deviation import Deviation
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 from .by_phase import distribution, taken_up
-from .motors import within_motors
-from .tensions import in_all_winds, scaled, with_all_loads
+from .tensions import in_all_winds, scaled, with_all_loads, within_motors
 
 OF_INSTANTS = (
     *("times", "tensions", "off_path", "A", "w", "tensions_unlimited", "gains", "violation", "supports"),

@@ -16,6 +16,7 @@ from ...base.tolerances import INDEPENDENT
 from ...models import Robot
 from ...solvers import Certificate, TensionProblem, certify, solve, solve_batch
 from ...statics.distribution import wrench_problem
+from ..limits.cables import WinchForce, WinchPower
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 from ..tasks.wind_set import WindBox, WindSet, as_wind, decisive_winds_at, possible_winds_at
@@ -27,6 +28,7 @@ INVERTED = 1e-3  # of the identity, in the Frobenius norm: what a product with a
 EXACT = 1e-12  # relative, of the wrench: tensions by pseudo-inverse that miss more are solved for again
 NEAREST = 1e10  # weight of the wrench error beside the tensions: so large that these do not shift it
 INNER_WINDS = 8  # of a box, at each instant others
+SPARES = 0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2  # of the weight: what exceeds motors where that is necessary, in order
 
 
 class AuditedTensions(NamedTuple):
@@ -253,3 +255,43 @@ def _in_span(A: np.ndarray, w: np.ndarray) -> np.ndarray:
     U, values, _ = np.linalg.svd(A, full_matrices=False)
     U = np.where(values[:, None] > INDEPENDENT * values[:, None, :1], U, 0.0)
     return (U @ (U.swapaxes(1, 2) @ w[..., None]))[..., 0]
+
+
+def within_motors(
+    scenario: Scenario, times: np.ndarray, A: np.ndarray, case: tuple[np.ndarray, np.ndarray], values: list[np.ndarray]
+) -> np.ndarray:
+    """Return the tensions (n, m) [N] of a motion, within the force and power of motors wherever such exist.
+
+    At each instant of a motion a motor's limit is one of the tension: its force is the tension and what accelerates the
+    winch, its power the tension times a speed. Where none exist, they exceed what motors can by little, if such exist;
+    at all other instants the tensions are the given ones.
+
+    - `A`: Wrench matrices with moments over `Robot.length`, (n, 6, m).
+    - `case`: Wrenches with the same moments, (n, 6) [N], and their tensions so far, (n, m) [N].
+    - `values`: What each limit bounds for these tensions, (n, k) each.
+    """
+    w, tensions = case
+    low, high = scenario.bounds_at(times)
+    least, most = np.full_like(low, -np.inf), np.full_like(high, np.inf)  # that motors permit
+    for limit, its in zip(scenario.limits, values, strict=True):
+        if isinstance(limit, WinchForce):
+            reflected = its - tensions[:, limit.cables]
+            most[:, limit.cables] = limit.high - reflected
+            least[:, limit.cables] = -limit.high - reflected
+        elif isinstance(limit, WinchPower) and limit.soft is None:
+            held = scenario.in_force(limit, times)[:, None] & (its != 0)
+            own = np.divide(limit.high * tensions, np.abs(its), np.full_like(most, np.inf), where=held)
+            most = np.minimum(most, own)
+    exceeded = np.any((tensions > np.minimum(high, most)) | (tensions < np.maximum(low, least)), axis=1)
+    if not exceeded.any():
+        return tensions
+    chosen = tensions.copy()
+    for spare in SPARES:
+        by = spare * scenario.robot.force_scale
+        lowest, highest = np.maximum(low, least - by), np.minimum(high, most + by)
+        rows = np.flatnonzero(exceeded & (lowest <= highest).all(axis=1))
+        if rows.size:
+            found = solve_batch(A[rows], w[rows], lowest[rows], highest[rows], tensions[rows])
+            chosen[rows[found.feasible]] = found.tensions[found.feasible]
+            exceeded[rows[found.feasible]] = False
+    return chosen
