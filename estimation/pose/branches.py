@@ -13,11 +13,10 @@ from ...models import points
 from ...models.files import AnyRobot, as_robot
 from ...models.robot import Robot
 from ...statics.equilibria import equilibria
-from .estimate import PoseEstimate, largest_cost
+from .estimate import PoseEstimate, largest_cost, taut
 from .from_lengths import SIGMA, checked_sigma, one_pose
 from .residual_tests import squares_of
 from .search import APART, Problem, level_platform, problem_of
-from .taut import taut
 
 
 def branches(

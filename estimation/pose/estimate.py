@@ -21,6 +21,7 @@ FALSE_ALARM_IN_LOG = 1e-4  # probability that any sample of a sound log is calle
 EXACT = 1e-6  # standard deviations: errors where there are as many lengths as coordinates
 CHANGED = 1e-6  # share of a motion of unit length
 MOST_TURN = np.radians(5.0)  # standard deviation of an angle up to which the geometry is nearly linear
+PULL = 0.03  # of the weight: a pose is off by the noise of its lengths, and so are the tensions that hold it
 MOST_CURVED = 0.5  # part of a change of lengths that is not linear, two standard deviations away
 
 
@@ -190,8 +191,6 @@ class PoseEstimate(Displayed):
     @property
     def taut(self) -> Any:
         """Return whether tensions of at least zero can hold the weight at rest at the pose, (...)."""
-        from .taut import taut
-
         held = taut(self.robot, self.pose.reshape(-1, 6), self._carriers())
         return held.reshape(self.pose.shape[:-1]) if self.pose.ndim > 1 else bool(held[0])
 
@@ -255,3 +254,21 @@ def gradient(robot: Robot, pose: np.ndarray, carrier_pose: np.ndarray | None) ->
     arm = np.einsum("...ij,j->...i", points.rotations(pose[..., 3:]), np.array(robot.platform.com))
     moments = A[..., 3:, :] + np.cross(arm[..., :, None], A[..., :3, :], axis=-2)
     return -np.swapaxes(np.concatenate([A[..., :3, :], moments], axis=-2) * robot.dof_mask[:, None], -1, -2)
+
+
+def taut(robot: Robot, poses: np.ndarray, carrier_pose: np.ndarray | None) -> np.ndarray:
+    """Return whether non-negative tensions hold the weight at rest, (N,), at poses (N, 6): measured cables are taut."""
+    if robot.weight == 0.0:
+        return np.ones(len(poses), bool)
+    dynamics, still = dynamics_of(robot), np.zeros(6)
+    rows = np.flatnonzero(robot.dof_mask)
+    A = (dynamics.wrench_matrix(poses, carrier_pose) * robot.wrench_scale[:, None])[:, rows]
+    w = (dynamics.required_wrench(poses, still, still) * robot.wrench_scale)[:, rows]
+    if robot.m == len(rows):
+        regular = np.abs(np.linalg.det(A)) > 1e-12
+        tensions = np.linalg.solve(np.where(regular[:, None, None], A, np.eye(robot.m)), w[..., None])[..., 0]
+        return regular & (tensions >= -PULL * robot.weight).all(axis=1)
+    from scipy.optimize import nnls
+
+    missing = [nnls(*balance)[1] for balance in zip(A, w, strict=True)]
+    return np.array(missing) <= PULL * robot.weight

@@ -19,9 +19,8 @@ from ...core import pose_from_lengths as descend
 from ...models import points
 from ...models.record import record_of
 from ...models.robot import Robot
-from .estimate import EXACT, PoseEstimate, gradient, largest_cost
+from .estimate import EXACT, PoseEstimate, gradient, largest_cost, taut
 from .residual_tests import squares_of
-from .taut import taut
 
 TURNS = np.radians([45.0, 90.0])
 OBLIQUE = np.radians([60.0, 25.0])  # about an axis between two, for platforms that have many poses with their lengths
