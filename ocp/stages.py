@@ -172,12 +172,15 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
     guessed = start is None and not search.knows(mesh)
     # The program alone gets past most places without tensions at rest, unless another formation is what they need.
     team = bool(scenario.loose)
-    collides = False
+    collides = shifted = False
     if guessed:
-        start, collides = motion_past(search, balance=team)
-    outcome = from_easier(search, mesh, start, guessed)
+        start, collides, shifted = motion_past(search, balance=team)
+    outcome = from_easier(search, mesh, start, guessed, shifted)
+    if shifted and not outcome.success and search.seconds_left > 0:
+        start = motion_past(search, balance=team, shifting=False).motion
+        outcome = from_easier(search, mesh, start, guessed)
     if not outcome.success and guessed and not (team or collides) and search.seconds_left > 0:
-        path, _ = motion_past(search, balance=True)
+        path = motion_past(search, balance=True).motion
         if path is not None:
             start, outcome = path, search.solve("nonlinear program", mesh, path)
     if not outcome.success and search.seconds_left > 0:

@@ -1,5 +1,6 @@
 """Paths past obstacles before any program is solved: through holes, round walls; checked by distances of our own."""
 
+from dataclasses import replace
 from functools import partial
 from itertools import combinations, pairwise
 
@@ -11,12 +12,14 @@ from towline import InputError, tensions
 from towline.benchmarks.scenes import APART, GATE, LENGTH, LOAD, QUADROTOR, TREES, forest, window
 from towline.models import Robot, load
 from towline.ocp import Planner, plan
+from towline.ocp.global_path import global_path
 from towline.ocp.global_path.at_rest import AtRest
 from towline.ocp.global_path.clear_space import ClearSpace
 from towline.ocp.global_path.global_path import find_global_path, with_clear_ends
 from towline.ocp.global_path.space import Space
 from towline.ocp.global_path.tree import guess_exceeds, is_open
 from towline.ocp.nlp.guess import usual_guess
+from towline.ocp.search.search import Search
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task
 
@@ -155,6 +158,31 @@ def test_only_motions_that_may_go_anywhere_have_global_paths():
 def test_a_plan_goes_through_the_hole():
     planned = plan(ROBOT, scenario_of(WALL_WITH_A_HOLE).task)
     assert planned.feasible, planned.report()
+    positions = planned.audit.motion.pose[:, :3]
+    assert min(outside(place, positions).min() for place in WALL_WITH_A_HOLE) >= KEPT - 1e-5
+
+
+def test_a_path_is_searched_for_where_no_program_finds_a_motion_from_a_shifted_one(monkeypatch, through_the_hole):
+    """The coarse program that starts from the shifted motion is made to fail: no finer one is solved from there."""
+    solve, failed = Search.solve, []
+
+    def failing(self, name, *arguments, **named):
+        outcome = solve(self, name, *arguments, **named)
+        fails = name == "coarse program" and not failed
+        failed.extend([name] * fails)
+        return replace(outcome, success=False, message="Infeasible_Problem_Detected") if fails else outcome
+
+    monkeypatch.setattr(Search, "solve", failing)
+    shifted = lambda scenario: lambda nodes: through_the_hole.guess(scenario).at(nodes)  # noqa: E731
+    monkeypatch.setattr(global_path, "formation_guess", shifted)
+    planned = plan(ROBOT, scenario_of(WALL_WITH_A_HOLE, steps=60).task)
+    assert planned.feasible, planned.report()
+    stages = [(stage.name.split(",")[0], stage.message) for stage in planned.stages]
+    first, second = (i for i, (name, _) in enumerate(stages) if name == "global path")
+    assert "a shifted or turned one keeps all limits" in stages[first][1]
+    assert "a path of" in stages[second][1]
+    assert "nonlinear program" not in [name for name, _ in stages[:second]]
+    assert "nonlinear program" in [name for name, _ in stages[second:]]
     positions = planned.audit.motion.pose[:, :3]
     assert min(outside(place, positions).min() for place in WALL_WITH_A_HOLE) >= KEPT - 1e-5
 

@@ -168,6 +168,24 @@ def test_a_solution_that_stopped_improving_is_continued_with_its_multipliers(mon
     assert again.iterations < expected.iterations
 
 
+def test_a_run_from_a_coarser_optimum_has_its_own_patience(monkeypatch):
+    """Nothing is better by as much as is asked for: a run ends as many iterations after a solution as it may wait."""
+    scenario, mesh, waited = scenario_of(TASK), Mesh(20), {}
+    monkeypatch.setattr(solver, "BETTER", 1.0)
+    monkeypatch.setattr(solver, "MET", 1e-3)  # long before the optimum
+    for coarser, own, other in ((True, "FROM_COARSER", "PATIENCE"), (False, "PATIENCE", "FROM_COARSER")):
+        monkeypatch.setattr(solver, other, 100)
+        for patience in (1, 2):
+            monkeypatch.setattr(solver, own, patience)
+            guess = initial_guess(scenario, np.linspace(0.0, scenario.duration, 21))
+            outcome = search.Search(scenario, {}, None).solve("own", mesh, guess, coarser=coarser)
+            assert outcome.success
+            waited[coarser, patience] = outcome.iterations
+            assert outcome.message == solver.SETTLED
+    assert waited[True, 2] == waited[True, 1] + 1
+    assert waited[False, 2] == waited[False, 1] + 1
+
+
 def test_where_a_program_goes_in_a_circle_distances_are_linear_about_the_motion_before(monkeypatch):
     """Within millimetres of a corner a step of Newton's method leads from one side to the other and back."""
     scenario, mesh = scenario_of(TASK | {"steps": 20}), Mesh(20)

@@ -10,8 +10,7 @@ from itertools import groupby
 import numpy as np
 
 from ...models.points import placed, rotations
-from ...models.polyhedron import convex_hull
-from ...models.shapes import Shape, skeleton
+from ...models.shapes import Block, ConvexMesh, Shape, skeleton
 from ..limits import Limit
 from ..limits.places import BodyOutside
 
@@ -49,8 +48,7 @@ class BodyBounds:
 
 def _faces(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
     """Return normals (f, 3) and offsets (f,) [m] of the faces of a shape's skeleton."""
-    its = skeleton(shape)
-    return convex_hull(its.corners)[:2] if its.solid else (np.zeros((0, 3)), np.zeros(0))
+    return shape.body[:2] if isinstance(shape, Block | ConvexMesh) else (np.zeros((0, 3)), np.zeros(0))
 
 
 class _Body:

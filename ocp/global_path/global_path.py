@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.random import Generator
@@ -274,31 +275,38 @@ def _clear_end(
     return inside(grown(space, first, score, np.minimum(free, 1.0), rng)[0])
 
 
-def motion_past(search: Search, balance: bool, most: tuple[int, int] | None = None) -> tuple[Deviation | None, bool]:
-    """Return a motion past what the usual guess collides with, or the best guess, and whether it collides at all.
+class Start(NamedTuple):
+    """The motion from which the programs of a task start, None for the usual guess; see `motion_past`."""
 
-    None is the usual guess where no formation is better.
+    motion: Deviation | None
+    collides: bool  # whether the usual guess does
+    shifted: bool = False  # whether the motion is the usual guess with another formation or attitude
 
-    With `balance` a configuration without tensions at rest is a collision. `most` is as for `find_global_path`.
+
+def motion_past(search: Search, balance: bool, most: tuple[int, int] | None = None, shifting: bool = True) -> Start:
+    """Return a motion past what the usual guess collides with, or else the best guess.
+
+    With `balance` a configuration without tensions at rest is a collision. `most` is as for `find_global_path`. Without
+    `shifting` a path is searched for even where another formation or attitude keeps all limits.
     """
     scenario = search.scenario
     if scenario.count == 0 or not is_open(scenario):
-        return None, False
+        return Start(None, False)
     with search.stage("global path") as stage:
         usual = partial(usual_guess, scenario)
         exceeded = guess_exceeds(scenario, usual, balance)
         nodes = np.linspace(0.0, scenario.duration, scenario.task.steps + 1)
         formation = formation_guess(scenario) if search.seconds_left > 0 else None
-        clear = formation is not None and not guess_exceeds(scenario, formation, balance)
+        clear = shifting and formation is not None and not guess_exceeds(scenario, formation, balance)
         if not exceeded:
             # A formation keeps more distance, but not between the places at which it was chosen.
-            return None if formation is None else (formation if clear else usual)(nodes), False
+            return Start(None if formation is None else (formation if clear else usual)(nodes), False)
         if formation is not None and clear:
             stage.message = f"the direct motion exceeds {exceeded}: a shifted or turned one keeps all limits"
-            return formation(nodes), True
+            return Start(formation(nodes), True, shifted=True)
         seconds = min(GLOBAL_SHARE * scenario.task.time_limit, search.seconds_left)
         path, message = find_global_path(scenario, seconds, most)
         stage.message = f"the direct motion exceeds {exceeded}: {message}"
         if path is not None:
-            return path.guess(scenario), True
-        return None if formation is None else formation(nodes), True
+            return Start(path.guess(scenario), True)
+        return Start(None if formation is None else formation(nodes), True)

@@ -25,7 +25,8 @@ from .waiting import Errands, wait_for
 
 MET = 1e-8  # what constraints of a program may miss, in its units
 BETTER = 1e-3  # of the objective: what a solution must be better by for the search to go on
-PATIENCE = 10  # iterations without a better one
+# Iterations without a better one. From the optimum of a coarser mesh a run is soon as good as that.
+PATIENCE, FROM_COARSER = 10, 5
 ROUND, CLOSE = 24, 1e-4  # iterates in a circle, and what constraints miss there at most
 GAIN = 1e-4  # of the objective: what an iterate must be better by not to be in a circle
 MOST_ITERATIONS = 400
@@ -38,7 +39,7 @@ TEAM = {"mumps_pivtol": 1e-4, "mumps_pivot_order": 5}
 # follows from the load's motion. Only accelerations of the nodes remain, times the square of a step: much less than
 # IPOPT's default, 1e-8, with which each step is far from Newton's. A minimum time took 300 iterations; it takes 36.
 NEARLY_SINGULAR = {"jacobian_regularization_value": 1e-13}
-TIME_LIMIT, SETTLED = "time limit", f"no better by {BETTER:.1%} in {PATIENCE} iterations"  # messages of ours
+TIME_LIMIT, SETTLED = "time limit", f"no better by {BETTER:.1%} in the last iterations"  # messages of ours
 STRAYED = "in a region that is left out"  # likewise
 LOOK = 10  # iterations after which, again and again, a run ends where its motion has strayed
 CIRCLING = f"{ROUND} iterates that are neither better nor nearer"  # likewise
@@ -176,7 +177,7 @@ class Solver:
             guess = initial_guess(program.scenario, program.shares * program.scenario.duration)
         if guess is not None:
             start["x0"] = program.pack(guess)
-        watch.begin(progress, seconds, stray)
+        watch.begin(progress, seconds, stray, FROM_COARSER if coarser else PATIENCE)
         self.interrupted = None
         try:
             result = wait_for(lambda: watch.follow(nlp, start), watch.errands)
@@ -251,11 +252,14 @@ class _Watch(ca.Callback):
         self.begin(None)
         self.construct("watch", {})
 
-    def begin(self, progress: Progress | None, seconds: float = np.inf, stray: bool = True) -> None:
+    def begin(
+        self, progress: Progress | None, seconds: float = np.inf, stray: bool = True, patience: int = PATIENCE
+    ) -> None:
         """Start to count again from zero."""
         self._progress = progress
         self.errands: Errands = SimpleQueue()  # calls of `progress`, for the thread that waits
         self._deadline = time.perf_counter() + seconds
+        self._patience = patience
         self.late = False  # whether the time is up
         self._looks = not (stray or self.program.near.is_everywhere)
         self.strayed = False  # whether the motion is deep in a region of which the program has no rows
@@ -276,7 +280,7 @@ class _Watch(ca.Callback):
     @property
     def settled(self) -> bool:
         """Return whether `best` no longer improves."""
-        return bool(self.best) and self.iteration - self._since > PATIENCE
+        return bool(self.best) and self.iteration - self._since > self._patience
 
     @property
     def circling(self) -> bool:

@@ -19,8 +19,11 @@ COARSE_PAST_PLACES = 30
 SLOWER = 3.0  # than the duration that the planner starts from
 
 
-def from_easier(search: Search, mesh: Mesh, start: Deviation | None, guessed: bool) -> Outcome:
-    """Solve the program from a motion that is nearer to its solution than `start`, if there is one."""
+def from_easier(search: Search, mesh: Mesh, start: Deviation | None, guessed: bool, another: bool = False) -> Outcome:
+    """Solve the program from a motion that is nearer to its solution than `start`, if there is one.
+
+    If there is `another` start, the coarse program without a solution is the outcome: a fine one takes far longer.
+    """
     if search.knows(mesh):
         return search.solve("nonlinear program", mesh, start)
     coarse = _coarse(search, mesh) if guessed else None
@@ -34,6 +37,8 @@ def from_easier(search: Search, mesh: Mesh, start: Deviation | None, guessed: bo
         ends = outcome.success or outcome.message == CIRCLING
         optimal = ends and not jumps(search.scenario, outcome.deviation)
         near = outcome.deviation if optimal else near
+        if another and not ends:
+            return outcome
     # Linear distances leave a motion at their bounds. From a small barrier the program would creep along them.
     outcome = search.solve("nonlinear program", mesh, near or start, coarser=optimal, clear=near is not None)
     if guessed and outcome.success and _cable_jumps(search, mesh, outcome.deviation):

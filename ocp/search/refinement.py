@@ -202,7 +202,7 @@ def _solved_beside(
     beside.most_effort = PART * (search.most_effort - search.effort)
     mesh = Mesh(steps if scenario.phases.all else min(steps, max(LARGE // count, FEWEST)))
     if guess is None and has_places(scenario):  # from a start that is clear the program takes few iterations
-        guess, _ = motion_past(beside, balance=bool(scenario.loose), most=CONFIGURATIONS)
+        guess = motion_past(beside, balance=bool(scenario.loose), most=CONFIGURATIONS).motion
     outcome = beside.solve("program of a relaxation", mesh, guess, clear=guess is not None)
     yield (beside, outcome) if outcome.success else None
     search.effort += beside.effort
