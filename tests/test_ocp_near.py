@@ -17,7 +17,7 @@ from towline.ocp.nlp.rows import CABLES, Mesh, swept
 from towline.ocp.planner import Planner
 from towline.ocp.search import feasible_changes, homotopy, search
 from towline.ocp.search.other_forces import larger_t_max
-from towline.ocp.search.refinement import _tightened
+from towline.ocp.search.refinement import _tightened, solved
 from towline.ocp.tasks.lay_out import lay_out
 
 PLATFORM = {"platform": 0.05, "cables": None, "carriers": None}
@@ -275,6 +275,23 @@ def test_smaller_clearances_are_not_searched_where_even_none_would_not_do(monkey
     assert not called
     poses = found.relaxations[0].plan.scenario.motion(np.linspace(0, 4, 2000), found.relaxations[0].plan.deviation)[0]
     assert np.linalg.norm(poses.pose[:, :3] - [0.2, 0, 1.2], axis=1).min() > 0.25 + 0.05 - 1e-6
+
+
+def test_programs_of_offers_have_half_the_steps_where_they_have_rows_of_regions(monkeypatch):
+    steps, own = [], search.Search.solve
+
+    def solve(self, name, mesh, *arguments, **named):
+        steps.append(mesh.steps)
+        return own(self, name, mesh, *arguments, **named)
+
+    monkeypatch.setattr(search.Search, "solve", solve)
+    task = TASK | {"steps": 200, "tube": {"position": 0.3}}
+    for places in (TASK["limits"]["keep_out"], []):
+        scenario = scenario_of(task | {"limits": {"keep_out": places}})
+        outcome = solved(search.Search(scenario, {}, None), scenario, None)
+        assert outcome is not None
+        assert len(outcome.deviation.nodes) == steps[-1] + 1
+    assert steps == [100, 200]
 
 
 @pytest.mark.parametrize("limit", [{}, {"tension_rate": 1e3}, {"winch_power": 1e4}])

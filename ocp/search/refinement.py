@@ -200,7 +200,8 @@ def _solved_beside(
     count, steps = max(scenario.count, 1), scenario.task.steps
     beside = Search(scenario, {}, search.progress, scenario.task.time_limit - search.solve_s)
     beside.most_effort = PART * (search.most_effort - search.effort)
-    mesh = Mesh(steps if scenario.phases.all else min(steps, max(LARGE // count, FEWEST)))
+    large = LARGE // 2 if has_places(scenario) else LARGE  # rows of regions make it twice as large
+    mesh = Mesh(steps if scenario.phases.all else min(steps, max(large // count, FEWEST)))
     if guess is None and has_places(scenario):  # from a start that is clear the program takes few iterations
         guess = motion_past(beside, balance=bool(scenario.loose), most=CONFIGURATIONS).motion
     outcome = beside.solve("program of a relaxation", mesh, guess, clear=guess is not None)
