@@ -49,8 +49,9 @@ class Contents(NamedTuple):
     @classmethod
     def of(cls, dataset: xr.Dataset) -> Contents:
         """Return the contents of a dataset."""
+        own = dataset.variables  # the values of `data_vars` are arrays with coordinates, which take long to make
         variables, coordinates = (
-            {str(name): Variable(tuple(map(str, one.dims)), one.values, one.attrs) for name, one in part.items()}
+            {str(name): Variable(tuple(map(str, own[name].dims)), own[name].values, own[name].attrs) for name in part}
             for part in (dataset.data_vars, dataset.coords)
         )
         return cls(variables, coordinates, dataset.attrs)

@@ -60,6 +60,7 @@ ATTITUDE = 40.0  # [rad/s]
 USUALLY, AT_LIMITS = 0.5, 1.0  # bounds of h times lateness; where commands at their limits cannot lead
 SLOWEST, WRONG = 15.0, 18.0  # [rad/s], of attitude loops: teams were lost below; with a delay that is wrong by 30 %
 SEPARATE = 2.0  # attitude over observers of teams, at least; with 0.9 and late states, teams were handed over
+PUSHED = 0.05  # of the weight: a sudden force to which carriers with one cable each lean their cables in time
 FREE = 1.5  # times the period of sensors: predictions omit that cables of fixed length tighten
 PLACE, CASCADE = 5.0, 6.0  # bandwidth of position [rad/s]; attitude over it and over that of deviations, at least
 
@@ -94,6 +95,23 @@ class Bandwidths(NamedTuple):
     attitude: float
     lead: float = np.inf
     lag: float = np.inf
+
+
+def correcting(robot: Robot, strongest: float) -> Usual:
+    """Return the defaults of `Predictive` for carriers that correct errors, and accelerate by at most `strongest`.
+
+    To balance a force of `PUSHED` of the weight, cables of length L lean by as much. Carriers with one cable each then
+    move by PUSHED L, in a time of about 1 / w, so w^2 PUSHED L is at most their acceleration [m/s^2]. Beyond, loads on
+    long cables swing for seconds after a push. Carriers with several cables of fixed length move with the load instead.
+    """
+    if robot.fixed_lengths is not None and np.bincount(robot.carrier_of_cable).max() > 1:
+        return TEAM
+    usual = TOWING if robot.fixed_lengths is None else TEAM
+    length = float(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean())
+    limits = [carrier.motion_limits.acceleration or np.inf for carrier in robot.carriers if carrier.moves]
+    most = min(strongest or np.inf, *limits) if limits else np.inf
+    part = min(np.sqrt(most / (PUSHED * length)) / usual.bandwidth, 1.0)
+    return usual._replace(bandwidth=part * usual.bandwidth, observer=part * usual.observer)
 
 
 def bandwidths_for(
@@ -157,9 +175,11 @@ def _attitude_for(robot: Robot, errors: "_Errors | None", lag: float, given: flo
     slowest = WRONG if delay else SLOWEST
     most = min(ATTITUDE, USUALLY / weight, max(AT_LIMITS / (lag / 2 + by_sensors), slowest))
     if given is None and most < slowest:
+        room = DELAY * (UNSTABLE * (USUALLY / slowest - left / 2) - period / PERIOD) / TURNED
+        hint = f" (a delay of at most {quantity(room, 's')} would permit them)" if delay and room > 0 else ""
         raise InputError(
             f"sensors must permit attitude loops of {slowest:g} rad/s, got carriers that turn {quantity(late, 's')} "
-            f"late, which permits {most:.2g} rad/s"
+            f"late, which permits {most:.2g} rad/s{hint}"
         )
     return given or most
 

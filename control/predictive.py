@@ -16,7 +16,7 @@ from ..solvers.horizon import Horizon
 from ..solvers.in_place import InPlace
 from ..statics.distribution import tensions as tensions_at
 from .as_floats import ROUNDING, as_floats
-from .bandwidths import CASCADE, PATIENT, STILL, TEAM, TOWING, bandwidths_for, noise_of_change
+from .bandwidths import CASCADE, PATIENT, STILL, bandwidths_for, correcting, noise_of_change
 from .carrier_references import moved_coordinates
 from .computed_torque import ComputedTorque
 from .controllability import needs_carriers
@@ -65,8 +65,8 @@ class Predictive(ComputedTorque):
         bandwidth: Closed-loop bandwidth [rad/s] away from limits, a number or one for each coordinate of the pose.
             Default: 40, but less if carriers correct errors, as they do with cables of fixed length, with fewer cables
             than degrees of freedom, or if they can move and their cables hardly turn the platform: 8 for teams with
-            cables of fixed length, 6 for towing robots with winches. Limited to 1.2 / `stage`, or 0.45 / `stage` if
-            carriers correct errors.
+            cables of fixed length, 6 for towing robots with winches, and less if long cables lean too slowly for it
+            (control/bandwidths.py). Limited to 1.2 / `stage`, or 0.45 / `stage` if carriers correct errors.
         stages, stage: Number of stages, and duration of each [s]. Default: 20 of 0.015 s; of 0.03 s if carriers may
             leave their reference, because they are slower; of 0.025 s if carriers correct errors. In slow loops, stages
             become as long as the steps, at most 0.21 s. A loop is slow if both the period given to `follow` and the
@@ -129,15 +129,14 @@ class Predictive(ComputedTorque):
         flies = np.array([bool(carrier.efforts) for carrier in the_robot.carriers])
         reacts = far * flies[:, None] * (not correct)
         far = far - reacts
-        correcting = TOWING if the_robot.fixed_lengths is None else TEAM
-        usual = correcting if correct else PATIENT if far.any() else STILL
+        self._strongest = number("carrier_acceleration", carrier_acceleration, 0.0, 1e4)
+        usual = correcting(the_robot, self._strongest) if correct else PATIENT if far.any() else STILL
         rotors = number("rotor_lag", rotor_lag, 0.0, 0.1)
         own = bandwidths_for(the_robot, usual, sensors, rotors, bandwidth, observer, attitude)
         self._bandwidth = own.bandwidth
         if carrier_bandwidth is None:
             carrier_bandwidth = min(usual.carrier_bandwidth, own.attitude / CASCADE)
         self._returning = number("carrier_bandwidth", carrier_bandwidth, 1e-3, 1e3)
-        self._strongest = number("carrier_acceleration", carrier_acceleration, 0.0, 1e4)
         self._stages = whole_number("stages", stages, 1, 200)
         self._stage = number("stage", usual.stage if stage is None else stage, 1e-4, 10.0)
         loops: dict[str, Any] = {"rate": rate, "place": place, "attitude": own.attitude, "patience": patience}

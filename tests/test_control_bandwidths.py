@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 
 from towline import InputError, load, plan, simulate
 from towline.control import ComputedTorque, FaultTolerant, Predictive
-from towline.control.bandwidths import HELD, SWINGING, TEAM, bandwidths_for
+from towline.control.bandwidths import HELD, SWINGING, TEAM, TOWING, bandwidths_for, correcting
 from towline.simulation import Noise
 
 from .warm import towline as run
@@ -104,6 +105,19 @@ def test_bandwidths_without_sensors_are_the_usual_ones_and_good_sensors_permit_m
         np.testing.assert_allclose(bandwidths_for(few, SWINGING, sensors, 0.0)[0], SWINGING.bandwidth)
 
 
+def test_carriers_that_lean_their_cables_have_time_to_accelerate():
+    """From rest to rest over a distance d within 2 / w, they accelerate by d w^2, forwards and back."""
+    for name, most, strongest in (("multi-quadrotor-3", TEAM, 1.0), ("wang-ctmrts-6", TOWING, 5.0)):
+        robot = load(name)  # its carriers accelerate by 5 m/s^2, or by 2
+        length = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean()
+        least = min(strongest, robot.carriers[0].motion_limits.acceleration)
+        slower = correcting(robot, strongest)
+        assert slower.bandwidth**2 * 0.05 * length == pytest.approx(least)
+        assert slower.observer / most.observer == pytest.approx(slower.bandwidth / most.bandwidth)
+    assert correcting(load("flycrane"), 1e-3) == TEAM  # whose carriers move with the load
+    assert correcting(load("point-mass-3"), 1e-3) == TOWING  # whose carriers stay
+
+
 def turns_more_and_more(h, lag, delay, period, told, steps=4000, dt=1e-3):
     """Return whether phi'' = u diverges with u' = (-2 h phi' - h^2 phi - u) / lag of states late and held [s].
 
@@ -193,6 +207,22 @@ def test_attitude_loops_are_as_fast_as_rotors_and_sensors_permit():
 def test_a_team_is_not_started_with_sensors_that_leave_its_attitude_loops_too_slow(make, late, least):
     with pytest.raises(InputError, match=rf"sensors must permit attitude loops of {least} rad/s, got carriers"):
         make("multi-quadrotor-4", sensors=late)
+
+
+@pytest.mark.parametrize(("rate", "rotor_lag"), [(None, 0.0), (100, 0.0), (None, 0.02)])
+def test_a_refused_delay_is_told_the_largest_one(rate, rotor_lag):
+    def start(delay):
+        rotors = {"rotor_lag": rotor_lag}
+        return ComputedTorque(
+            "multi-quadrotor-4", sensors={"delay": delay, **({"rate": rate} if rate else {})}, **rotors
+        )
+
+    with pytest.raises(InputError, match="a delay of at most") as refused:
+        start(0.05)
+    most = float(re.search(r"at most ([\d.]+) s would", str(refused.value))[1])
+    start(0.99 * most)
+    with pytest.raises(InputError, match="attitude loops of 18"):
+        start(1.01 * most)
 
 
 @pytest.mark.parametrize(

@@ -85,3 +85,21 @@ def test_a_load_whose_six_cables_nearly_meet_at_its_axis_is_turned_by_its_carrie
             assert run.answered["as planned"] == len(run.error)
             assert run.record.tensions.max() < 0.6 * robot.weight  # 0.2 at rest, and once 5
     assert errors[0] < errors[1] < 0.02
+
+
+def test_carriers_of_long_cables_do_not_overshoot_after_a_push():
+    """With the bandwidth of short cables carriers accelerated beyond their limits, and were three times as far off."""
+    data, length = load("multi-quadrotor-3").model_dump(mode="json"), 5.0
+    for cable, carrier in zip(data["cables"], data["carriers"], strict=True):
+        along = np.subtract(carrier["home"][:3], cable["attachment"])
+        carrier["home"][:3] = (cable["attachment"] + length / cable["length"] * along).tolist()
+        cable["length"] = length
+    robot = Robot.model_validate(data)
+    push = f"push {0.1 * robot.weight} 0 0 at 0.2 for 0.5"
+    off = []
+    for given in ({}, {"bandwidth": 8.0, "observer": 20.0}):
+        run = simulate(robot, robot.home, Predictive(robot, **given), events=[push], duration=1.7, period=0.002)
+        off.append(run.error.max())
+    # A free load would be 0.1 g 0.5 s / 2 (0.5 s + 2 1 s) = 0.61 m off by then.
+    assert off[0] < 0.05
+    assert off[0] < 0.5 * off[1]
