@@ -100,17 +100,19 @@ class Bandwidths(NamedTuple):
 def correcting(robot: Robot, strongest: float) -> Usual:
     """Return the defaults of `Predictive` for carriers that correct errors, and accelerate by at most `strongest`.
 
-    To balance a force of `PUSHED` of the weight, cables of length L lean by as much. Carriers with one cable each then
-    move by PUSHED L, in a time of about 1 / w, so w^2 PUSHED L is at most their acceleration [m/s^2]. Beyond, loads on
-    long cables swing for seconds after a push. Carriers with several cables of fixed length move with the load instead.
+    To balance a force of `PUSHED` of the weight, cables lean by as much. Carriers with one cable each, at a height H
+    above the load, then move by PUSHED H in a time of about 1 / w, so w^2 PUSHED H is at most their acceleration
+    [m/s^2]. Beyond, loads on long cables swing for seconds after a push. Carriers with several cables of fixed length
+    move with the load instead.
     """
     if robot.fixed_lengths is not None and np.bincount(robot.carrier_of_cable).max() > 1:
         return TEAM
     usual = TOWING if robot.fixed_lengths is None else TEAM
-    length = float(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean())
+    down = np.array(robot.gravity) / max(np.linalg.norm(robot.gravity), TINY)
+    height = max(float((robot.home_attachments - robot.home_anchors).mean(axis=0) @ down), TINY)
     limits = [carrier.motion_limits.acceleration or np.inf for carrier in robot.carriers if carrier.moves]
     most = min(strongest or np.inf, *limits) if limits else np.inf
-    part = min(np.sqrt(most / (PUSHED * length)) / usual.bandwidth, 1.0)
+    part = min(float(np.sqrt(most / (PUSHED * height))) / usual.bandwidth, 1.0)
     return usual._replace(bandwidth=part * usual.bandwidth, observer=part * usual.observer)
 
 
