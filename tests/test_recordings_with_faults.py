@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
@@ -15,6 +16,7 @@ from towline.estimation.calibration.plausibility import mistake
 from towline.estimation.logs.encoders import unrolled
 from towline.models import Dynamics, load
 
+from .framed import framed
 from .test_calibration_mistakes import a_log, seen
 from .user_recordings import FRAME, PLATFORM, robot_file, write
 
@@ -182,3 +184,36 @@ def test_a_table_of_a_spreadsheet(tmp_path):
     found = read_measurements(tmp_path / "log.csv")
     assert found.m == 8
     np.testing.assert_allclose(found.times, np.delete(TIMES, 7))
+
+
+def test_a_platform_that_swings_on_locked_winches_makes_cables_slack():
+    """A mass is pushed towards the anchor of its third cable, swings on the others, and is caught when it returns."""
+    anchors, draw = np.array([[-2.0, 0, 0], [2, 0, 0], [0, 3, 0]]), np.random.default_rng(3)
+    robot = framed(
+        [(list(one), [0, 0, 0]) for one in anchors], {"mass": 4, "home": [0, 0.4, -2, 0, 0, 0], "dof": ["x", "y", "z"]}
+    )
+    radius, angles, rest = np.hypot(0.4, 2), [], np.arctan2(0.4, 2)  # about the line through the first two anchors
+    for speed in (0.7, 0.5, 0.9, 0.6, 0.8):
+        pushed = [rest, speed], np.arange(0, 3, 0.02)  # [rad, rad/s], [s]
+        arc = solve_ivp(
+            lambda _, s: [s[1], -9.81 / radius * np.sin(s[0])], (0, 3), pushed[0], t_eval=pushed[1], rtol=1e-9
+        ).y[0]
+        angles += [np.full(75, rest), arc[: np.argmax(np.append(arc, 0)[1:] < rest) + 1]]
+    angle = np.concatenate(angles)
+    poses = np.zeros((len(angle), 6))
+    poses[:, 1], poses[:, 2] = radius * np.sin(angle), -radius * np.cos(angle)
+    loose = angle > rest + 0.02
+    assert 0.1 < loose.mean() < 0.4
+    offsets = draw.normal(0, 0.03, 3)
+    held = np.linalg.norm(poses[0, :3] - anchors, axis=1) - offsets
+    seen = poses + draw.normal(0, 2e-4, poses.shape) * [1, 1, 1, 0, 0, 0]
+    log = Measurements(np.tile(held, (len(seen), 1)), seen, times=0.02 * np.arange(len(seen)), sigma=3e-4)
+    result = calibrate(robot, log, ["offsets"])
+    assert result.refused is None
+    count = re.search(rf"{REASON}: cables\[2\] \((\d+)\)\n", result.report())
+    # Just after a push and before an impact, smoothed accelerations do not show it: these few are outliers.
+    assert count
+    assert 0.7 * loose.sum() < int(count[1]) < loose.sum() + 10
+    assert len(result.outliers) < 0.3 * loose.sum()
+    np.testing.assert_allclose([one.value for one in result.parameters], offsets, atol=1e-3)
+    assert max(one.sigma for one in result.parameters) < 0.01  # by lengths of slack cables 0.1

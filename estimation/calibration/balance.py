@@ -378,13 +378,15 @@ class Balance:
 
 
 def hangs(robot: Robot, measurements: Measurements) -> bool:
-    """Return whether weight and inertia of a platform determine the tensions of its cables, of which none are measured.
-
-    If no reading ever changes, winches are locked and the platform swings.
-    """
-    few = measurements.tensions is None and robot.m <= robot.dof_mask.sum() and robot.weight > 0
+    """Return whether a platform `is_carried` on winches of which some turn: if all are locked, it swings."""
     locked = np.array_equal(measurements.lengths[1:], measurements.lengths[:-1])
-    return bool(few and not locked and not any(carrier.actuators for carrier in robot.carriers))
+    return is_carried(robot, measurements) and not locked
+
+
+def is_carried(robot: Robot, measurements: Measurements) -> bool:
+    """Return whether weight and inertia of a platform determine the tensions of its cables, none of them measured."""
+    few = measurements.tensions is None and robot.m <= robot.dof_mask.sum() and robot.weight > 0
+    return bool(few and not any(carrier.actuators for carrier in robot.carriers))
 
 
 def needs_balance(robot: Robot, measurements: Measurements) -> bool:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .balance import FeltTensions, hangs
+from .balance import FeltTensions, is_carried
 from .fit import Fit, fit
 from .left_out import hardly_pull
 from .model import Model, State
@@ -13,12 +13,12 @@ ROUNDS = 10  # of fits without the readings of cables that the one before shows 
 
 
 def carrying(model: Model, state: State, errors: bool = False) -> FeltTensions | None:
-    """Return the tensions of a platform that `hangs` at a state of the whole log, None for other logs.
+    """Return the tensions of a platform that `is_carried` at a state of the whole log, None for other logs.
 
     They are smoothed, as noise of the poses, which lengths have as well, would look like stretch. With `errors`, those
     of accelerations are unknowns.
     """
-    if model.forces is None or not hangs(model.robot, model.measurements):
+    if model.forces is None or not is_carried(model.robot, model.measurements):
         return None
     found: list[FeltTensions] = []
     for _, part, own in model.parts(state):

@@ -63,7 +63,8 @@ def repeating(model: Model, state: State, root: np.ndarray) -> Repeating | None:
         lengths[rows] = runs(part.robot, table, position, rotation, at).lengths.T
         ends = position[:, None] + np.einsum("nij,mj->nmi", rotation, table[:, 3:6])
         places[rows] = ends.reshape(len(ends), -1)
-    spread = np.sqrt([places.var(axis=0).sum() / m, lengths.var(axis=0).mean()])
+    wound = np.ma.masked_array(lengths, ~model.weights.T)  # with locked winches, only slack cables change much
+    spread = np.sqrt([places.var(axis=0).sum() / m, wound.var(axis=0).mean()])
     if 2**depth < FEWEST:
         return None
     cell, squares = _cells(places, depth), 0.0
@@ -86,7 +87,9 @@ def repeating(model: Model, state: State, root: np.ndarray) -> Repeating | None:
     if Q.shape[1] < FEWEST:
         return None
     z = (Q.T @ y)[:, 0]
-    centre, mean = (np.stack([of[cell == i].mean(axis=0) for i in range(2**depth)]) for of in (places, lengths))
+    centre, mean = (
+        np.ma.stack([of[cell == i].mean(axis=0) for i in range(2**depth)]).filled(0.0) for of in (places, wound)
+    )
     apart = np.linalg.norm(centre[:, None] - centre, axis=2)[..., None] / np.sqrt(m)
     likely = CERTAIN - len(z) * np.log(max(float((z**2).mean()), 1e-300)) / 2
     best: tuple[float, bool, np.ndarray] | None = None

@@ -14,8 +14,8 @@ from .clock import is_still
 from .considered import usual_error
 from .file_errors import ENDS
 from .geometry import length_of
-from .hanging import slack
-from .left_out import SLACK, left_out
+from .hanging import carrying
+from .left_out import SLACK, hardly_pull, left_out
 from .parameters import GROUPS, IN_BALANCE, Parameter
 from .result import CalibrationData, apart
 from .solving import considered_of
@@ -244,10 +244,10 @@ def _of_exceptions(result: CalibrationData) -> list[str]:
         f"{'longer' if slip.size > 0 else 'shorter'} than its reading (+- {_mm(slip.sigma)})"
         for slip, (_, first) in zip(result.slips, model.parameters.slips, strict=True)
     ]
-    felt = model.felt if hangs(model.robot, model.measurements) else None
-    slack_there = (slack(model, result._solved.fit.state) & ~model.weights).T
-    for why, which in left_out(model.robot, model.measurements, felt.tensions if felt else None).items():
-        count = ((which & ~model.weights.T) | slack_there * (why == SLACK)).sum(axis=0)
+    felt = carrying(model, result._solved.fit.state)
+    loose = hardly_pull(felt.tensions) if felt else np.zeros_like(model.weights.T)
+    for why, which in left_out(model.robot, model.measurements).items():
+        count = ((which | loose * (why == SLACK)) & ~model.weights.T).sum(axis=0)
         if count.any():
             named = ", ".join(f"cables[{i}] ({count[i]})" for i in np.flatnonzero(count))
             lines.append(f"left out: readings of {why}: {named}")

@@ -265,10 +265,11 @@ def model_of(
         model = replace(model, start=placed(robot, measurements, start))
     elastic = "elasticity" in groups or parameters.compliances(parameters.first).any()
     begin = model.begin()
-    felt = carrying(model, begin._replace(x=near.parameters) if near else begin, True) if elastic else None
+    felt = carrying(model, begin._replace(x=near.parameters) if near else begin, True) if elastic or near else None
     if weights is None:
         carried = felt.tensions if felt and near else None
         weights = ~np.any(list(left_out(robot, measurements, carried).values()), axis=0).T
+    felt = felt if elastic else None
     return replace(model, weights=weights, felt=felt)
 
 

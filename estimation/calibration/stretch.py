@@ -104,7 +104,8 @@ def is_elastic(solved: Solved) -> bool:
 
 
 def uses_slack(solved: Solved) -> bool:
-    """Return whether a fit with elasticity uses readings of cables that hardly pull by its own tensions."""
+    """Return whether a fit uses readings of cables that hardly pull by its own tensions, with those of inertia."""
     of = solved.model
-    felt = None if of.felt is None or of.has_unknown_poses else carrying(of, solved.fit.state)
+    known = of.forces is not None and of.forces.motion_is_known and not of.has_unknown_poses
+    felt = carrying(of, solved.fit.state) if known else None
     return felt is not None and bool((of.weights & hardly_pull(felt.tensions).T).mean() > LOOSE)
