@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...models.part import LARGEST
-from .balance import hangs
+from .balance import hangs, is_carried
 from .considered import from_thrusts, usual_error
 from .fit import held
 from .geometry import length_of
@@ -106,6 +106,7 @@ def is_elastic(solved: Solved) -> bool:
 def uses_slack(solved: Solved) -> bool:
     """Return whether a fit uses readings of cables that hardly pull by its own tensions, with those of inertia."""
     of = solved.model
-    known = of.forces is not None and of.forces.motion_is_known and not of.has_unknown_poses
-    felt = carrying(of, solved.fit.state) if known else None
+    if of.forces is None or of.has_unknown_poses or not is_carried(of.robot, of.measurements):
+        return False
+    felt = carrying(of, solved.fit.state) if of.forces.motion_is_known else None
     return felt is not None and bool((of.weights & hardly_pull(felt.tensions).T).mean() > LOOSE)
