@@ -39,3 +39,14 @@ def pytest_collection_finish():
     gc.set_threshold(NEW_OBJECTS)
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture(scope="module")
+def stable_at_home():
+    """Leave out the simulation at home in which `Predictive` looks for growing errors, a second for each new setting.
+
+    That simulation and its answer are tested in test_control_stability.py.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("towline.control.predictive.grows", lambda *_: False)
+        yield

@@ -72,21 +72,20 @@ def optimum_by_enumeration(A, w, t_min, t_max, t_ref=None, weights=None):
     weights = np.ones(m) if weights is None else weights
     size = max(np.linalg.norm(w), *(np.linalg.norm(A @ t) for t in (np.clip(0.0, t_min, t_max), t_ref)), 1e-300)
     best, best_cost = None, np.inf
-    for pattern in product(("low", "high", "free"), repeat=m):
-        held = {"low": t_min, "high": t_max}
-        t = np.array([t_ref[i] if kind == "free" else held[kind][i] for i, kind in enumerate(pattern)])
-        if not np.isfinite(t).all():
-            continue
-        free = [i for i, kind in enumerate(pattern) if kind == "free"]
-        if free:
+    for free in np.array(list(product((False, True), repeat=m))):
+        corners = np.array(list(product(*zip(t_min[~free], t_max[~free], strict=True))))  # (2^k, k) of k held cables
+        t = np.tile(np.asarray(t_ref, float), (len(corners), 1))
+        t[:, ~free] = corners
+        t = t[np.isfinite(t).all(axis=1)]
+        if free.any():
             root = 1.0 / np.sqrt(weights[free])
-            t[free] += root * np.linalg.lstsq(A[:, free] * root, w - A @ t, rcond=1e-11)[0]
-        slack = 1e-9 * np.abs(t).max()
-        if np.linalg.norm(A @ t - w) > 1e-9 * size or (t < t_min - slack).any() or (t > t_max + slack).any():
-            continue
-        cost = weights @ (t - t_ref) ** 2
-        if cost < best_cost:
-            best, best_cost = t, cost
+            t[:, free] += (root[:, None] * np.linalg.lstsq(A[:, free] * root, w[:, None] - A @ t.T, rcond=1e-11)[0]).T
+        slack = 1e-9 * np.abs(t).max(axis=1, keepdims=True)
+        inside = ((t >= t_min - slack) & (t <= t_max + slack)).all(axis=1)
+        t = t[inside & (np.linalg.norm(t @ A.T - w, axis=1) <= 1e-9 * size)]
+        costs = (t - t_ref) ** 2 @ weights
+        if costs.min(initial=np.inf) < best_cost:
+            best, best_cost = t[costs.argmin()], costs.min()
     return best
 
 

@@ -254,7 +254,7 @@ def test_all_search_the_same_layouts(monkeypatch):
     assert task.score(task.draws()[0]) >= task.score(task.draws()[-1])
     pytest.importorskip("pymoo")
     pytest.importorskip("cma")
-    found = design.measure("ipanema-2", 0.2, 1)
+    found = design.measure("ipanema-2", 0.1, 1)
     assert list(found) == ["towline", "pymoo GA", "cma", "cma, drawn"]
     assert all(np.isfinite(each).all() for each in found.values())
     lines = design.table({"ipanema-2": found})

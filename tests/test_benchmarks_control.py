@@ -16,6 +16,7 @@ from towline.simulation import simulate
 
 from .soak.predictive_steps import Checked, fly_random
 
+pytestmark = pytest.mark.usefixtures("stable_at_home")
 FREE, TEAM = TASKS[0], TASKS[-1]
 LIMITS = Task("limits", lambda: load("wang-flying"), (8, 5, 1), 2.0, reach=0.5, stage=0.015)
 

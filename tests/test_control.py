@@ -377,13 +377,13 @@ def test_fewer_cables_than_coordinates_give_what_they_can(name):
     robot = load(name)
     end = (robot.home[:3] + np.array([0.2, 0.1, 0.1])).tolist()
     line = {"kind": "line", "start": robot.home[:3].tolist(), "end": end}
-    calm = simulate(robot, line, ComputedTorque(robot), duration=2.0)
+    calm = simulate(robot, line, ComputedTorque(robot), duration=2.0, period=2e-3)
     status = np.where(calm.error > calm.tolerance, "off the reference", "as planned")
     assert [ANSWERS[each] for each in calm.record.answered] == status.tolist()
     push = 0.5 * robot.weight * np.array([1, 0.4, 0, 0, 0, 0])
-    pushed = simulate(robot, robot.home, ComputedTorque(robot), duration=1.5, disturbance=push)
+    pushed = simulate(robot, robot.home, ComputedTorque(robot), duration=1.5, period=2e-3, disturbance=push)
     assert pushed.error.max() > 0.2
-    assert pushed.answered["soft wrench"] > 500
+    assert pushed.answered["soft wrench"] > 250
 
 
 def test_carriers_react_to_what_the_plan_does_not_know_alone():
@@ -411,7 +411,7 @@ def test_carriers_react_to_what_the_plan_does_not_know_alone():
 
 
 @pytest.mark.parametrize("gains", [{}, {"bandwidth": 20.0, "observer": 20.0}, {"bandwidth": 40.0, "observer": 60.0}])
-@pytest.mark.parametrize("damping", [20.0, 200.0, 300.0])  # 1.5 times that of the file
+@pytest.mark.parametrize("damping", [20.0, 300.0])  # 1.5 times that of the file
 def test_quadrotors_that_take_over_a_disturbance_do_not_swing(gains, damping):
     """Cables damp what quadrotors do when they turn, and the observer takes these tensions for a disturbance."""
     data = load("wang-flying-quadrotor").model_dump()
@@ -430,7 +430,9 @@ def test_robot_ends_stay_inside_their_boxes():
     """A side force that the reaction answers with more than the boxes permit."""
     robot = load("wang-ctmrts")
     push = np.array([0.3 * robot.platform.mass * 9.81, 0, 0, 0, 0, 0])
-    flight = simulate(robot, robot.home, ComputedTorque(robot, reach=(2.0, 0.0)), duration=4.0, disturbance=push)
+    flight = simulate(
+        robot, robot.home, ComputedTorque(robot, reach=(2.0, 0.0)), duration=4.0, period=4e-3, disturbance=push
+    )
     places = flight.trajectory["carrier_command"].values[..., :3]
     boxes = [carrier.motion_limits.reach for carrier in robot.carriers]
     for index, box in enumerate(boxes):
@@ -440,13 +442,8 @@ def test_robot_ends_stay_inside_their_boxes():
 
 def test_an_integral_brings_a_platform_back_that_a_force_has_moved():
     robot, push = load("cogiro"), np.array([30.0, 0, 0, 0, 0, 0])
-    gains = {"bandwidth": 5.0, "observer": 0.0}
-    errors = [
-        simulate(
-            robot, robot.home, ComputedTorque(robot, integral=integral, **gains), duration=6.0, disturbance=push
-        ).error
-        for integral in (0.0, 30.0)
-    ]
+    laws = (ComputedTorque(robot, bandwidth=5.0, observer=0.0, integral=integral) for integral in (0.0, 30.0))
+    errors = [simulate(robot, robot.home, law, duration=6.0, period=4e-3, disturbance=push).error for law in laws]
     offset = push[0] / robot.platform.mass / 5.0**2
     assert errors[0][-1] == pytest.approx(offset, rel=0.05)
     assert errors[1][-1] < 0.05 * offset
@@ -567,7 +564,7 @@ def test_a_quadrotor_that_is_heavier_than_in_its_file_stays_at_its_place():
     first, *others = robot.carriers
     lighter = robot.model_copy(update={"carriers": (first.model_copy(update={"mass": first.mass / 1.3}), *others)})
     controller, blind = ComputedTorque(lighter), ComputedTorque(lighter, observer=0)
-    flight, low = (simulate(robot, robot.home, duration=3.0, controller=each) for each in (controller, blind))
+    flight, low = (simulate(robot, robot.home, each, duration=3.0, period=2e-3) for each in (controller, blind))
     assert flight.error[-1] < 1e-2
     assert low.error[-1] > 3 * flight.error[-1]
     controller.reset()
@@ -576,7 +573,7 @@ def test_a_quadrotor_that_is_heavier_than_in_its_file_stays_at_its_place():
     for k in range(1500):
         tensions = flight.record.tensions[max(k - 1, 0)]
         state = State(motions[k, 0, :6], motions[k, 0, 6:], motions[k, 1:, :6], motions[k, 1:, 6:], tensions)
-        controller.step(1e-3 * k, state, flight.conditions.references[k])
+        controller.step(2e-3 * k, state, flight.conditions.references[k])
     np.testing.assert_allclose(controller.disturbance_of_carriers[0, 0], [0, 0, weight], atol=0.5)
 
 

@@ -145,7 +145,7 @@ def turns_more_and_more(h, lag, delay, period, told, steps=4000, dt=1e-3):
     return bool(largest[-steps // 4 :].max() > largest[: steps // 4].max())
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=15)
 @given(st.integers(0, 15), st.integers(0, 20), st.integers(0, 40))
 def test_attitude_loops_with_the_permitted_bandwidth_are_stable_and_refused_ones_are_not(lag, delay, period):
     """Even if the age over which carriers are predicted is wrong by 30 %, or lacks the time for which they are held."""
@@ -244,7 +244,7 @@ def test_a_team_with_the_latest_sensors_that_are_permitted_corrects_a_push(make,
     robot, noise = load(name), told | {"delay": factor * told["delay"]}
     force = 0.02 * robot.weight * np.array([0.6, 0.8, 0.0])
     push = [{"kind": "push", "at": 0.2, "duration": 0.3, "force": force.tolist()}]
-    team = simulate(robot, robot.home, make(robot, sensors=told), duration=4.0, period=5e-3, noise=noise, events=push)
+    team = simulate(robot, robot.home, make(robot, sensors=told), duration=3.0, period=5e-3, noise=noise, events=push)
     assert team.handed_over is None
     assert team.answered["as planned"] == len(team.error)
     assert 1e-4 < team.error.max() < 0.03

@@ -41,11 +41,15 @@ def test_a_plan_without_the_load_that_the_platform_carries_is_named(carries):
     assert "released" not in run.report()
 
 
-@pytest.mark.parametrize("noise", [None, LATE], ids=["now", "30 ms late"])
 @pytest.mark.parametrize(
-    "controller",
-    [ComputedTorque(COGIRO), ComputedTorque(COGIRO, observer=0), Predictive(COGIRO)],
-    ids=["computed torque", "without observer", "predictive"],
+    ("controller", "noise"),
+    [
+        (ComputedTorque(COGIRO), None),
+        (ComputedTorque(COGIRO), LATE),
+        (ComputedTorque(COGIRO, observer=0), LATE),
+        (Predictive(COGIRO), LATE),
+    ],
+    ids=["computed torque", "computed torque, late", "without observer, late", "predictive, late"],
 )
 def test_a_planned_load_is_carried_within_a_millimetre(carries, controller, noise):
     """The plant carries it as the symbolic model says (test_simulation_own_events.py); unaware, 40 mm are missed."""

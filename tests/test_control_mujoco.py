@@ -1,6 +1,7 @@
 """Controllers on robots that are not as their files have them, in MuJoCo and in the plant: what they do, and say."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,10 +15,10 @@ from towline.estimation import PoseFilter
 from towline.models import Robot, load
 from towline.statics.distribution import tensions
 
-from .robots_hooked_below import hooked_below
 from .soak.control_mujoco import TEAMS, WINCHES, Task, cogiro, fly, team, wang_flying
 from .soak.mujoco_plant import Hardware
 
+pytestmark = pytest.mark.usefixtures("stable_at_home")
 OTHERWISE, SOFT = ANSWERS.index("not as modelled"), ANSWERS.index("soft wrench")
 
 
@@ -34,13 +35,18 @@ def load_on_three():
 
 
 def shorter(task: Task, steps: int) -> Task:
-    return Task(**{**vars(task), "references": task.references[:steps]})
+    return replace(task, references=task.references[:steps])
+
+
+def coarser(task: Task, steps: int) -> Task:
+    """Return the task's first steps, of which two are one, which halves the processor time."""
+    return replace(task, references=task.references[: 2 * steps : 2], period=2 * task.period)
 
 
 @pytest.fixture(scope="module")
 def error_of_unknown_lag(circle):
     """The largest error [m] of `Predictive` if it does not know that the winches lag by 20 ms."""
-    task = shorter(circle, 400)
+    task = coarser(circle, 200)
     return fly(task, Predictive(task.robot, reach=task.reach), **WINCHES["tension lag 20 ms"]).error.max()
 
 
@@ -50,7 +56,7 @@ def test_the_plant_written_here_moves_as_the_one_of_towline(circle):
     still = [rest._replace(pose=robot.home, velocity=np.zeros(6), acceleration=np.zeros(6),
                            carrier_pose=robot.carrier_home, carrier_velocity=0 * robot.carrier_home,
                            carrier_acceleration=0 * robot.carrier_home)] * 500  # fmt: skip
-    task = Task(**{**vars(circle), "references": still, "gusts": 0.0, "wind": (3, 0, 0)})
+    task = replace(circle, references=still, gusts=0.0, wind=(3, 0, 0))
     own = fly(task, ComputedTorque(robot)).error
     push = 0.5 * 1.29 * task.area * 3.0**2
     other = simulate(robot, robot.home, ComputedTorque(robot), duration=0.5, disturbance=[push, 0, 0, 0, 0, 0]).error
@@ -61,34 +67,20 @@ def test_the_plant_written_here_moves_as_the_one_of_towline(circle):
 def test_a_winch_that_gives_nine_tenths_is_made_up_for(circle):
     """With a sensor that reports it: the observer may not take the lacking tenth for explained."""
     robot, reach = circle.robot, circle.reach
-    usual = fly(shorter(circle, 1200), ComputedTorque(robot, reach=reach), **WINCHES["gain 0.9"])
-    assert usual.error[-500:].max() < 5e-4  # 11 mm if measured tensions explain the momentum
-    loop = fly(shorter(circle, 1200), ComputedTorque(robot, reach=reach, tension_loop=20.0), **WINCHES["gain 0.9"])
+    usual = fly(coarser(circle, 600), ComputedTorque(robot, reach=reach), **WINCHES["gain 0.9"])
+    assert usual.error[-250:].max() < 5e-4  # 11 mm if measured tensions explain the momentum
+    loop = fly(coarser(circle, 600), ComputedTorque(robot, reach=reach, tension_loop=20.0), **WINCHES["gain 0.9"])
     assert loop.rms < 1e-3
-    ahead = fly(shorter(circle, 800), Predictive(robot, reach=reach), **WINCHES["gain 0.9"])
+    ahead = fly(coarser(circle, 400), Predictive(robot, reach=reach), **WINCHES["gain 0.9"])
     assert ahead.rms < 5e-4
-    assert ahead.error[-300:].max() < 1e-4
+    assert ahead.error[-150:].max() < 1e-4
 
 
-def test_a_suspended_robot_whose_winches_give_nine_tenths_is_within_a_millimetre():
-    """In gusts, which the usual gains of computed torque leave 2 mm of whatever winches do."""
-    pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")
-    task = shorter(cogiro(), 500)
-    law = ComputedTorque(task.robot, 20.0, observer=30.0, tension_loop=20.0)
-    assert fly(task, law, **WINCHES["gain 0.9"]).rms < 1e-3
-    ahead = Predictive(task.robot, tension_loop=20.0)
-    assert fly(task, ahead, **WINCHES["gain 0.9"]).rms < 5e-4
-    slow = Predictive(task.robot)
-    assert fly(shorter(task, 400), slow, **WINCHES["winch loop, stiffness 0.8"]).rms < 1e-3
-    assert slow.handed_over is None  # computed torque is at 1 mm there
-
-
-@pytest.mark.parametrize(("case", "standard", "ahead"), [("delay 5 ms", 1.0, 0.1), ("50 Hz, 30 ms late", 2.0, 0.3)])
-def test_reports_that_come_with_their_time_cost_little(circle, case, standard, ahead):
-    """Both controllers leave speed x age without: 3 mm, and 24."""
-    task, late = shorter(circle, 700), WINCHES[f"{case}, with times"]
-    assert 1e3 * fly(task, ComputedTorque(task.robot, reach=task.reach), **late).rms < standard
-    assert 1e3 * fly(task, Predictive(task.robot, reach=task.reach), **late).rms < ahead
+def test_reports_that_come_with_their_time_cost_little(circle):
+    """Both controllers leave speed x age without: 24 mm."""
+    task, late = shorter(circle, 700), WINCHES["50 Hz, 30 ms late, with times"]
+    assert 1e3 * fly(task, ComputedTorque(task.robot, reach=task.reach), **late).rms < 2.0
+    assert 1e3 * fly(task, Predictive(task.robot, reach=task.reach), **late).rms < 0.3
 
 
 @pytest.mark.parametrize(("kind", "most"), [(ComputedTorque, 6e-4), (Predictive, 2e-4)])
@@ -101,7 +93,7 @@ def test_a_known_delay_of_states_without_a_time_is_made_up_for(circle, kind, mos
 @pytest.mark.parametrize("told", [0.7, 1.3])
 def test_a_delay_that_is_told_wrong_by_a_third_costs_that_third(circle, told):
     """Of 30 ms: 0.3 times speed and delay. Measured tensions, extrapolated as they are, would be a loop at 55 Hz."""
-    task, speed, made = shorter(circle, 900), 0.2 * np.pi, []
+    task, speed, made = coarser(circle, 300), 0.2 * np.pi, []
 
     def mistimed(kind):
         class Mistimed(kind):
@@ -113,7 +105,7 @@ def test_a_delay_that_is_told_wrong_by_a_third_costs_that_third(circle, told):
     for kind in (ComputedTorque, Predictive):
         made.append(controller := mistimed(kind))
         flown = fly(task, controller, delay=0.03, stamped=True)
-        assert flown.error[-300:].max() < 1.1 * 0.3 * speed * 0.03
+        assert flown.error[-150:].max() < 1.1 * 0.3 * speed * 0.03
         assert (flown.answered == 0).all()
     assert made[1].handed_over is None
 
@@ -121,12 +113,12 @@ def test_a_delay_that_is_told_wrong_by_a_third_costs_that_third(circle, told):
 def test_reports_at_fifty_hertz_leave_quick_observers_stable():
     """A report is of the last period. With the command's mean over all 20 ms, 40 rad/s are 0.9 m off after 2 s."""
     pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")
-    task, late = shorter(cogiro(), 1400), WINCHES["50 Hz, 30 ms late, with times"]
+    task, late = coarser(cogiro(), 700), WINCHES["50 Hz, 30 ms late, with times"]
     assert fly(task, ComputedTorque(task.robot, observer=40.0), **late).rms < 2e-3
     known = {"rate": 50, "delay": 0.03, "stamped": True}
-    assert fly(shorter(cogiro(), 2000), ComputedTorque(task.robot, sensors=known), **late).rms < 2e-3
+    assert fly(coarser(cogiro(), 1000), ComputedTorque(task.robot, sensors=known), **late).rms < 2e-3
     ahead = Predictive(task.robot)
-    assert fly(shorter(task, 800), ahead, **late).rms < 2e-3
+    assert fly(shorter(task, 200), ahead, **late).rms < 2e-3
     assert ahead.handed_over is None
 
 
@@ -151,7 +143,7 @@ def test_all_at_once_leaves_a_millimetre_of_a_suspended_robot():
 
 def test_noise_that_tensions_have_no_room_for_is_reported(circle):
     """Steps of 0.2 mm and 0.4 mrad, differenced: the platform, of 0.8 kg m^2, has cables at 2 N that end 0.3 m off."""
-    task = shorter(circle, 700)
+    task = shorter(circle, 400)
     controller = Predictive(task.robot, reach=task.reach)
     coarse = fly(task, controller, resolution=(2e-4, 4e-4))
     assert "noise" in controller.handed_over.reason
@@ -177,7 +169,7 @@ def test_predictions_that_do_not_come_true_are_given_up(circle, case):
 
 
 def test_lags_and_wrong_masses_that_predictions_bear_are_no_reason_to_give_them_up(circle):
-    task = shorter(circle, 500)
+    task = coarser(circle, 150)
     controller = Predictive(task.robot, reach=task.reach)
     for case in ("winch loop, stiffness 0.8", "tension lag 20 ms", "mass +10 %"):
         flown = fly(task, controller, **WINCHES[case])
@@ -185,9 +177,8 @@ def test_lags_and_wrong_masses_that_predictions_bear_are_no_reason_to_give_them_
         assert flown.rms < 1e-3
 
 
-@pytest.mark.parametrize(("name", "later"), [("multi-quadrotor-4", 0.025), ("multi-quadrotor-6", 0.025)])
-def test_a_lost_rotor_is_noticed_within_fifty_milliseconds(name, later):
-    robot = load(name)
+def test_a_lost_rotor_is_noticed_within_fifty_milliseconds():
+    robot, later = load("multi-quadrotor-4"), 0.025
     controller = Predictive(robot)
     flight = simulate(robot, robot.home, controller, duration=0.4, events=["lose quad1 at 0.3"])
     assert 0.3 < flight.handed_over <= 0.3 + later
@@ -302,7 +293,7 @@ def test_quadrotors_without_a_state_turn_as_they_were_about_to_and_stop(name):
 @pytest.mark.parametrize(("told", "kind", "most"), [(0.06, ComputedTorque, 0.045), (0.08, Predictive, 0.01)])
 def test_a_known_lag_of_rotors_is_made_up_for(load_on_three, told, kind, most):
     """60 ms, at which both leave the plan otherwise, also where the lag is told wrong by a third."""
-    task = shorter(load_on_three, 500)
+    task = coarser(load_on_three, 250)
     controller = kind(task.robot, rotor_lag=told)
     assert fly(task, controller, **TEAMS["rotor lag 60 ms"]).rms < most
     assert getattr(controller, "handed_over", None) is None
@@ -312,7 +303,7 @@ def test_a_known_lag_of_rotors_is_made_up_for(load_on_three, told, kind, most):
 @pytest.mark.parametrize("told", [0.014, 0.026])
 def test_a_known_lag_of_winches_is_made_up_for(circle, error_of_unknown_lag, told):
     """20 ms, also without tension sensors and where the lag is told wrong by 30 %."""
-    task, late = shorter(circle, 400), {"lag": 0.02, "sensor": None}
+    task, late = coarser(circle, 200), {"lag": 0.02, "sensor": None}
     controller = Predictive(task.robot, reach=task.reach, tension_lag=told)
     assert fly(task, controller, **WINCHES["tension lag 20 ms"]).error.max() < 0.75 * error_of_unknown_lag
     assert fly(task, controller, **late).rms < 1e-4
@@ -370,23 +361,10 @@ def test_limits_that_a_lead_meets_are_not_taken_for_a_longer_lag():
 
 def test_known_lags_of_rotors_and_sensors_slow_a_team_down_before_it_is_lost(load_on_three):
     """40 rad/s behind 35 ms, of which the commands can make up for none: computed torque is 1.3 m off with defaults."""
-    task, late = shorter(load_on_three, 1000), {"delay": 0.02, "stamped": True}
+    task, late = coarser(load_on_three, 500), {"delay": 0.02, "stamped": True}
     for kind in (ComputedTorque, Predictive):
         controller = kind(task.robot, rotor_lag=0.03, sensors=late)
         assert fly(task, controller, rotor_lag=0.03, **late).error.max() < 0.025
-
-
-@pytest.mark.parametrize("depth", [0.05, 0.1])
-def test_anchors_below_the_com_of_quadrotors_are_left_to_computed_torque(depth):
-    """A quadrotor that turns first moves its anchors the wrong way, which predictions take for an error."""
-    robot = hooked_below(depth)
-    push = 0.03 * robot.weight * np.array([1, 0.5, -0.5, 0, 0.05, 0])
-    with pytest.warns(UserWarning, match="computed torque: small errors at home grow"):
-        controller = Predictive(robot)
-    flight = simulate(robot, robot.home, controller, duration=0.6, disturbance=push)
-    assert flight.answered["not as modelled"] == 600
-    assert flight.error.max() < 1.1e-3
-    assert "computed torque from the start" in flight.report()
 
 
 @pytest.mark.filterwarnings("error::UserWarning")
@@ -435,7 +413,7 @@ def test_a_team_keeps_its_bandwidths_with_a_filter_that_knows_the_dynamics(load_
 def test_known_noise_of_a_filter_is_not_taken_for_a_wrong_model(load_on_three):
     """Poses of 1 mm and 1 mrad without velocities: the filter's are 30 mm/s off, which looks like 0.2 g in 50 ms."""
     robot, last = load_on_three.robot, []
-    for known, steps in ((True, 500), (False, 300)):
+    for known, steps in ((True, 300), (False, 300)):
         task = shorter(load_on_three, steps)
         follow = PoseFilter(robot)
         for k in range(200):
@@ -505,7 +483,7 @@ def test_only_what_is_missing_counts_as_missing_in_a_team(load_on_three):
     """
     task = load_on_three
     for mass, soft in ((1.5, False), (3.0, True)):
-        flown = fly(shorter(task, 1200), ComputedTorque(task.robot), mass=mass)
-        assert (flown.error[-300:].max() > 0.03) == soft
-        assert (np.count_nonzero(flown.answered == SOFT) > 100) == soft
+        flown = fly(coarser(task, 600), ComputedTorque(task.robot), mass=mass)
+        assert (flown.error[-150:].max() > 0.03) == soft
+        assert (np.count_nonzero(flown.answered == SOFT) > 50) == soft
         assert soft or (flown.answered == 0).all()

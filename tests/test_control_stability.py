@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 from towline import simulate
-from towline.control import ComputedTorque, Predictive, Reference, State
+from towline.control import ComputedTorque, Predictive, Reference, State, stability
 from towline.control.controllability import is_underactuated
 from towline.control.stability import grows
 from towline.models import Robot, load
 from towline.plant import Plant
 from towline.statics.distribution import tensions
+
+from .robots_hooked_below import hooked_below
 
 PERIOD, SECONDS, PUSH = 4e-3, 8.0, 1e-4  # [s], [s], of the weight
 
@@ -115,7 +117,7 @@ def test_whether_errors_grow_is_found_with_late_states_and_actuators():
     assert not grows(controller, robot, rest, 1.5, 0.04, 0.0)
     assert grows(controller, robot, rest, 1.5, 0.0, 0.0)
     for lag, is_unstable in ((0.0, False), (0.1, True)):
-        assert grows(ComputedTorque(robot, attitude=60.0), robot, rest, 1.5, 0.0, lag) == is_unstable
+        assert grows(ComputedTorque(robot, attitude=60.0), robot, rest, 3.0, 0.0, lag) == is_unstable
 
 
 def test_errors_that_grow_slowly_are_found():
@@ -124,3 +126,34 @@ def test_errors_that_grow_slowly_are_found():
     rest = tensions(robot, robot.home)
     assert grows(ComputedTorque(robot, 30.0, damping=0.0, observer=0.0), robot, rest, 30.0, 0.0, 0.0)
     assert not grows(ComputedTorque(robot, 30.0, observer=0.0), robot, rest, 30.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("depth", [0.05, 0.1])
+def test_anchors_below_the_com_of_quadrotors_are_left_to_computed_torque(depth):
+    """A quadrotor that turns first moves its anchors the wrong way, which predictions take for an error."""
+    robot = hooked_below(depth)
+    push = 0.03 * robot.weight * np.array([1, 0.5, -0.5, 0, 0.05, 0])
+    with pytest.warns(UserWarning, match="computed torque: small errors at home grow"):
+        controller = Predictive(robot)
+    flight = simulate(robot, robot.home, controller, duration=0.6, disturbance=push)
+    assert flight.answered["not as modelled"] == 600
+    assert flight.error.max() < 1.1e-3
+    assert "computed torque from the start" in flight.report()
+
+
+def test_a_team_that_is_not_at_rest_at_home_is_not_called_unstable():
+    """Nor is one at rest there. The carrier whose home is 0.1 m off its place at rest starts to move by itself."""
+    robot = load("multi-quadrotor-3")
+    first, *others = robot.carriers
+    off = first.model_copy(update={"home": (first.home[0] + 0.1, *first.home[1:])})
+    for team in (robot, robot.model_copy(update={"carriers": (off, *others)})):
+        run = simulate(robot, robot.home, Predictive(team), duration=0.3, period=2e-3)
+        assert run.answered["as planned"] == 150
+        assert run.error.max() < 2e-3
+
+
+def test_a_team_with_a_bandwidth_of_zero_can_be_controlled(monkeypatch):
+    """Its loop at home is simulated at construction, for a time that a bandwidth of zero does not determine."""
+    for name, value in (("LEAST", 20), ("MOST", 40), ("_KEPT", {})):
+        monkeypatch.setattr(stability, name, value)
+    assert Predictive("multi-quadrotor-3", bandwidth=0.0).robot.name == "multi-quadrotor-3"

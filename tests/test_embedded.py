@@ -35,9 +35,9 @@ def exported(tmp_path_factory):
 @pytest.mark.parametrize("real", ["double", "float"])
 @pytest.mark.parametrize("compiler", ["gcc", "clang", "aarch64-linux-gnu-gcc", "arm-none-eabi-gcc"])
 def test_no_compiler_has_a_warning(exported, compiler, real):
-    """The first has all robots; they differ in numbers, and the others have some of them."""
+    """The first has all robots once; they differ in numbers, and the others have some of them."""
     required(compiler)
-    folders = exported if compiler == "gcc" else exported[:: 4 if compiler == "clang" else 8]
+    folders = exported[:: 1 if (compiler, real) == ("gcc", "double") else 4 if compiler in ("gcc", "clang") else 8]
     sources = [folder / "towline_step.c" for folder in folders] + [exported[-1] / "main.c"]
     extra = [*(ARM if compiler.startswith("arm") else ()), *(["-DTOWLINE_FLOAT"] if real == "float" else [])]
     subprocess.run([compiler, *FLAGS, "-Wdouble-promotion", *extra, "-fsyntax-only", *sources], check=True)
@@ -192,7 +192,7 @@ def test_operations_are_those_of_the_code(name):
     assert re.search(rf"mechanics +{total}, and {counts['SIN'] + counts['COS']} sines and cosines", header)
 
 
-@pytest.mark.parametrize("name", ["wang-flying", "cogiro", "twelve"])
+@pytest.mark.parametrize("name", ["wang-flying", "twelve"])
 def test_no_step_has_more_operations_than_the_bounds(tmp_path, name):
     """Each operation is counted, by the step compiled as C++ with numbers that count."""
     required("g++")
@@ -279,13 +279,12 @@ def test_the_deepest_stack_is_that_of_the_longest_calls():
     assert deepest(graph, "top") == 160
 
 
-@pytest.mark.parametrize("name", ["cogiro", "twelve"])
-def test_code_and_stack_are_small(tmp_path, name):
+def test_code_and_stack_are_small(tmp_path):
     """On a Cortex-M7 where there is its compiler: 25 kB of code, and 6 kB of stack for twelve cables."""
     required("gcc")
     if "Free Software Foundation" not in subprocess.check_output(["gcc", "--version"], text=True):
         pytest.skip("gcc is another compiler here, which does not report the stack")
-    size = measure_size(robot_named(name), "double", tmp_path, target())
+    size = measure_size(robot_named("twelve"), "double", tmp_path, target())
     assert size.text < 25_000
     assert 2_000 < size.stack <= 6 * 1024
 

@@ -59,14 +59,14 @@ def test_the_zoo_is_told_apart_or_declined_as_documented(method):
 def test_every_feasible_problem_is_solved_by_methods_that_say_so(method):
     rng = np.random.default_rng(31)
     counts = {"optimal": 0, "failed": 0}
-    for k in range(40):
+    for k in range(24):
         problem = random_feasible(rng, 3 + k % 8)
         counts[solve(problem, method).status] += 1
     if method in ALWAYS_FIND or method == "dykstra":
         assert counts["failed"] == 0
     else:
-        assert counts["optimal"] >= (30 if method == "improved-closed-form" else 15)
-    for k in range(16):
+        assert counts["optimal"] >= (18 if method == "improved-closed-form" else 9)
+    for k in range(8):
         problem = random_infeasible(rng, 3 + k % 8)
         solution = solve(problem, method)
         assert not solution.feasible
@@ -90,7 +90,7 @@ def best_along(problem, gradient):
 def test_methods_that_solve_the_same_problem_agree():
     rng = np.random.default_rng(32)
     same = [("2-norm", {}), ("dykstra", {}), ("soft-wrench", {}), ("p-norm", {"p": 2})]
-    for k in range(40):
+    for k in range(20):
         m = 6 + k % 5
         problem = inner_problem(rng, m, t_ref=rng.uniform(0, 60, m), weights=10.0 ** rng.uniform(-1, 1, m))
         expected = solve(problem).tensions
@@ -176,7 +176,7 @@ def on_a_face(rng):
 def test_on_the_boundary_methods_keep_their_own_criterion():
     """Least squares to t_ref, which differs for each of the four, are neither their centre nor least with a barrier."""
     rng = np.random.default_rng(46)
-    for _ in range(20):
+    for _ in range(10):
         problem, held = on_a_face(rng)
         nearest = solve(problem)
         assert nearest.feasible
@@ -329,8 +329,8 @@ CONTINUOUS = [name for name, method in methods().items() if method.continuous]
 
 @pytest.mark.parametrize("method", CONTINUOUS)
 def test_methods_that_claim_continuity_do_not_jump(method):
-    """Check five motions; `python -m tests.soak continuity` takes a hundred."""
-    result = continuity(method, range(5))
+    """Check a motion of each kind; `python -m tests.soak continuity` takes a hundred."""
+    result = continuity(method, range(2, 5))
     print(method, result)
     assert result.worst <= JUMP
     assert result.unanswered == 0
@@ -344,10 +344,10 @@ def test_the_continuity_test_can_see():
 
 @pytest.mark.parametrize("options", [{}, {"rho": 1.0}])
 def test_soft_wrench_does_not_jump_as_the_wrench_leaves_the_set(options):
-    result = leaving("soft-wrench", range(8), **options)
+    result = leaving("soft-wrench", range(4), **options)
     assert result.worst <= JUMP
     assert result.unanswered == 0
-    assert result.inaccurate > 100
+    assert result.inaccurate > 50
 
 
 @pytest.mark.parametrize(

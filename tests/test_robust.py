@@ -187,7 +187,7 @@ def test_no_plan_is_an_answer(tmp_path):
     assert saved.exists()
     turned = plan(
         robot.model_copy(update={"uncertainty": known("wang-flying", 0.003).uncertainty}),
-        HOVER | {"robust": 0.95, "tube": {"attitude": 0.3}, "steps": 50},
+        HOVER | {"robust": 0.95, "tube": {"attitude": 0.3}, "steps": 24},
     )
     assert turned.feasible
     assert turned.share_of_robots(seed=7).share >= 0.95

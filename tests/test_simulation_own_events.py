@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from towline import InputError, load, plan, simulate
-from towline.control import ComputedTorque, OpenLoop, Predictive, references
+from towline.control import ComputedTorque, OpenLoop, references
 from towline.control.late_states import Pending
 from towline.control.trajectory import read_trajectory
 from towline.models import Dynamics
@@ -398,7 +398,7 @@ def test_the_loads_of_a_plan_are_carried_in_their_phases(tmp_path):
     phases = [{"name": f"phase-{k}", "path": line, "duration": 0.8} for k, line in enumerate(lines)]
     phases[1]["load"] = bag
     plan(robot, {"phases": phases}).save(tmp_path / "moved.nc")
-    run = simulate(robot, tmp_path / "moved.nc", Predictive(robot), duration=2.4)
+    run = simulate(robot, tmp_path / "moved.nc", duration=2.4)
     assert run.passed
     assert run.error.max() < 3e-3
     text = run.report()

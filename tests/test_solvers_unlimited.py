@@ -44,9 +44,9 @@ def unlimited_problem(seed):
 
 
 PROBLEMS = [
-    *make_task("soft", 8, 20).problems,
+    *make_task("soft", 8, 8).problems,
     *make_task("soft", 4, 5).problems,
-    *(unlimited_problem(seed) for seed in range(24)),
+    *(unlimited_problem(seed) for seed in range(14)),
 ]
 
 

@@ -36,10 +36,11 @@ class Task:
 
     Attributes:
         robot: The robot as its controllers know it.
-        references: One for each period of 1 ms.
+        references: One for each period.
         reach: Of carriers that help the tensions [m]; default: that of the controllers.
         hardware: The robot where a case names nothing else.
         wind, gusts, area: Mean wind and intensity [m/s] on the platform, and its area times the drag coefficient [m^2].
+        period: Of the controller [s].
     """
 
     robot: Robot
@@ -49,6 +50,7 @@ class Task:
     wind: tuple[float, float, float]
     gusts: float
     area: float
+    period: float = PERIOD
 
 
 @dataclass(frozen=True)
@@ -195,11 +197,11 @@ def fly(task: Task, controller: Controller, seed: int = 0, air_of_carriers: floa
     motion[0, :6], motion[0, 6:] = first.pose, first.velocity
     motion[1:, :6], motion[1:, 6:] = first.carrier_pose, first.carrier_velocity
     assert first.tensions is not None
-    world = World(task.robot, hardware, motion, first.tensions, PERIOD, seed)
-    times = PERIOD * np.arange(len(task.references))
+    world = World(task.robot, hardware, motion, first.tensions, task.period, seed)
+    times = task.period * np.arange(len(task.references))
     wind = air.dryden(times, task.wind, (task.gusts, task.gusts, task.gusts / 2), seed=seed)
     controller.reset()
-    controller.follow(task.references, PERIOD)
+    controller.follow(task.references, task.period)
     error, answered = np.full(len(times), np.nan), np.zeros(len(times), dtype=int)
     unexplained = np.zeros(len(times))
     for k, reference in enumerate(task.references):
