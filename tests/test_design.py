@@ -274,7 +274,7 @@ def test_what_a_layout_can_do_is_never_called_impossible(name, share, seed):
     assert find_impossibility(variables, rows_of(robot, read.require, [pose[None]])) is None
 
 
-@pytest.mark.parametrize(("name", "clearance"), [("planar-4", 0.0), ("ipanema-2", 0.0), ("ipanema-2", 0.02)])
+@pytest.mark.parametrize(("name", "clearance"), [("planar-4", 0.0), ("ipanema-2", 0.02)])
 def test_the_best_pairing_is_that_of_brute_force(name, clearance):
     robot = load(name)
     cables = [0, 1, 2, 3] if name == "planar-4" else [0, 3, 4, 6]
@@ -496,7 +496,7 @@ def winches(robot):
     return {"part": "t_max", "range": {"min": robot.t_min.max() + 1.0, "max": 20_000}, "equal": True}
 
 
-@pytest.mark.parametrize(("name", "margin"), [("cogiro", 30.0), ("ipanema-2", 12.0), ("planar-4", 5.0)])
+@pytest.mark.parametrize(("name", "margin"), [("cogiro", 30.0), ("planar-4", 5.0)])
 def test_the_weakest_winches_are_those_of_a_bisection(name, margin):
     """With the points of the file: the margin at listed poses is that of weaker winches up to what `design` finds."""
     robot, rng = load(name), np.random.default_rng(3)

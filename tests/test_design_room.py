@@ -194,7 +194,7 @@ def test_a_pushed_platform_swings_at_the_frequency_of_the_design(stiff):
     pose = min(poses, key=lambda pose: lowest_frequency(robot, pose))
     pilot = LengthControl(robot, proportional=0, integral=0)
     push = "push 6 -4 5 0.9 1.2 -0.8 at 0 for 0.02"
-    run = simulate(robot, pose, controller=pilot, duration=20.0, events=[push], period=4e-3)
+    run = simulate(robot, pose, controller=pilot, duration=10.0, events=[push], period=4e-3)
     motion = run.trajectory["pose"].values[10:]
     count = 8 * len(motion)
     spectrum = np.abs(np.fft.rfft((motion - motion.mean(0)) * np.hanning(len(motion))[:, None], count, axis=0))

@@ -95,9 +95,9 @@ def test_a_file_of_plain_hdf5_makes_no_noise(saved, tmp_path):
 def test_many_wrong_items_take_time_in_proportion():
     """Each copied the list of those that followed it."""
     with pytest.raises(
-        InputError, match=r"^lengths: max\[0\] must be a number.*; also wrong: max\[1\], .* and 4996 more$"
+        InputError, match=r"^lengths: max\[0\] must be a number.*; also wrong: max\[1\], .* and 2496 more$"
     ):
-        Lengths(min=0.1, max=["x"] * 5000)
+        Lengths(min=0.1, max=["x"] * 2500)
 
     def took(count: int) -> float:
         details = [{"loc": ("max", i), "type": "float_type", "msg": "x", "input": "x"} for i in range(count)]
@@ -105,14 +105,13 @@ def test_many_wrong_items_take_time_in_proportion():
         assert len(_without_branches(details)) == count
         return time.process_time() - start
 
-    least = [min(took(count) for _ in range(3)) for count in (5000, 40_000)]
+    least = [min(took(count) for _ in range(3)) for count in (2500, 20_000)]
     assert least[1] < 24 * least[0]  # 8 in proportion, 64 if each copies the rest
 
 
-@pytest.mark.parametrize("item", ["x", "{a: 1}"])
-def test_a_yaml_file_of_many_items_is_refused_before_the_rest_is_read(item):
+def test_a_yaml_file_of_many_items_is_refused_before_the_rest_is_read():
     """Half a million took half a minute: each becomes several objects of the YAML reader, then an error of its own."""
-    text = f"name: many\npath:\n  points: [{', '.join([item] * 100_000)}}}"  # what ends it is never reached
+    text = f"name: many\npath:\n  points: [{', '.join(['{a: 1}'] * 100_000)}}}"  # what ends it is never reached
     with pytest.raises(
         InputError, match=r"^many\.yaml: text is not YAML \(has more than 30000 values and keys, line 3\)"
     ):

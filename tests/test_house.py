@@ -4,6 +4,7 @@ import ast
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
@@ -35,12 +36,17 @@ def modules(root, tops):
     return {name.removesuffix("__init__").removesuffix("."): file for file, name in names.items()}
 
 
+@cache
+def tree(file):
+    return ast.parse(file.read_text())
+
+
 def imports(name, file, known):
     """The modules that a file imports anywhere: also inside functions, and under TYPE_CHECKING."""
     package = name.split(".") if file.name == "__init__.py" else name.split(".")[:-1]
     package = [part for part in package if part]
     found = set()
-    for node in ast.walk(ast.parse(file.read_text())):
+    for node in ast.walk(tree(file)):
         if isinstance(node, ast.ImportFrom):
             above = package[: len(package) - node.level + 1] if node.level else []
             parts = [*above, *(node.module.split(".") if node.module else [])]
@@ -154,7 +160,7 @@ def test_only_carriers_know_their_kinds():
     words = classes | {f'"{kind}"' for kind in _KINDS}  # files without any of them need not be parsed
     for file in {path for room in rooms() for path in (ROOT / room).rglob("*.py")} - {ROOT / "models" / "carriers.py"}:
         text = file.read_text()
-        for node in ast.walk(ast.parse(text if any(word in text for word in words) else "")):
+        for node in ast.walk(tree(file)) if any(word in text for word in words) else ():
             named = {getattr(node, "id", None), getattr(node, "attr", None), getattr(node, "name", None)}
             assert not named & classes, f"{file.relative_to(ROOT)} names {named & classes}"
             parts = ast.walk(node) if isinstance(node, ast.Compare | ast.Match) else ()
@@ -191,10 +197,8 @@ def imported_by(statement):
 def test_importing_is_cheap():
     """What costs 0.3 s and more alone is imported where it is used."""
     heavy = {"xarray", "qpsolvers", "osqp", "matplotlib.pyplot", "scipy.optimize"}
-    for statement in ("import towline", "import towline.models", "import towline.solvers", "import towline.cli.main"):
-        assert not heavy & imported_by(statement), statement
-    for statement in ("import towline.cli.main", "import towline; towline.load('wang-flying-quadrotor')"):
-        assert "casadi" not in imported_by(statement), statement
+    assert not heavy & imported_by("import towline, towline.models, towline.solvers")
+    assert not (heavy | {"casadi"}) & imported_by("import towline.cli.main, towline; towline.load('wang-flying')")
 
 
 def test_no_name_hides_a_module():
@@ -222,7 +226,7 @@ def test_no_constant_of_a_module_replaces_another():
     """Where two modules became one, 20001 places in each cell of a corner replaced 8."""
     for file in set(modules(ROOT, rooms()).values()):
         found = set()
-        for node in ast.parse(file.read_text()).body:
+        for node in tree(file).body:
             targets = [name for target in getattr(node, "targets", []) for name in ast.walk(target)]
             names = [name.id for name in targets if isinstance(name, ast.Name) and isinstance(name.ctx, ast.Store)]
             assert not found & set(names), f"{file.relative_to(ROOT)} assigns {names} twice"

@@ -252,7 +252,7 @@ def test_a_team_that_carries_its_load_on_an_exact_line_rests_at_its_ends_at_the_
     line = {"kind": "line", "start": home, "end": [home[0] + 2, *home[1:]]}
     plans = [
         plan("multi-quadrotor-3", {"path": line, "base": {"kind": "free"}, "duration": 4, "steps": steps})
-        for steps in (25, 50)
+        for steps in (16, 32)
     ]
     assert all(each.feasible for each in plans)
     assert plans[1].objective == pytest.approx(plans[0].objective, rel=0.05)
@@ -262,21 +262,8 @@ def test_a_team_that_carries_its_load_on_an_exact_line_rests_at_its_ends_at_the_
     assert plans[1].scenario.task.path.timing == "smoother"
 
 
-def test_a_team_carries_its_load_along_exact_legs_round_a_corner():
-    """By the usual law the snap jumps at the corner, hence the accelerations of the quadrotors: none was found."""
-    robot = load("multi-quadrotor-3")
-    points = [(robot.home[:3] + offset).tolist() for offset in ([0, 0, 0], [0.3, 0, 0], [0.3, 0.2, 0.15])]
-    path = {"kind": "waypoints", "points": points}
-    found = plan(robot, {"path": path, "base": {"kind": "free"}, "duration": 6, "time_limit": 60})
-    assert found.feasible
-    assert found.tracking_error_max < 1e-9
-    assert found.scenario.task.path.timing == "smoother"
-    speed = found.scenario.task.path.at(np.linspace(2, 4, 401), 6.0).velocity
-    assert np.linalg.norm(speed, axis=1).min() > 0.02  # it does not stop at the corner
-
-
 def test_a_team_carries_its_load_along_exact_lines_and_legs_one_after_the_other():
-    """By the usual law the snap jumps where a part ends as well: none was found."""
+    """By the usual law the snap jumps at the corner and where a part ends: none was found."""
     robot = load("multi-quadrotor-3")
     points = [(robot.home[:3] + offset).tolist() for offset in ([0, 0, 0], [0.3, 0, 0], [0.3, 0.2, 0.15])]
     legs, line = {"kind": "waypoints", "points": points}, {"kind": "line", "start": points[2], "end": points[0]}
@@ -285,6 +272,8 @@ def test_a_team_carries_its_load_along_exact_lines_and_legs_one_after_the_other(
     found = plan(robot, {"base": {"kind": "free"}, "time_limit": 30, "phases": phases})
     assert found.feasible
     assert found.tracking_error_max < 1e-9
+    speed = found.scenario.task.path.at(np.linspace(2, 4, 401), 11.0).velocity
+    assert np.linalg.norm(speed, axis=1).min() > 0.02  # it does not stop at the corner
     again = plan(robot, found.scenario.task)  # which says all that was chosen
     assert again.feasible
     assert [part.path.timing for part in again.scenario.task.path.parts] == ["smoother", "smoother"]
@@ -335,7 +324,7 @@ def test_carriers_may_be_anywhere_around_a_platform_whose_frame_is_elsewhere(hei
     assert plan(Robot.model_validate(data), task).feasible
 
 
-@pytest.mark.parametrize("name", ["wang-ctmrts-4", "wang-ctmrts-5", "wang-ctmrts-6"])
+@pytest.mark.parametrize("name", ["wang-ctmrts-4", "wang-ctmrts-5"])
 def test_ends_that_carriers_cannot_hold_from_within_their_reach_are_proven(name):
     """By a linear program for the forces of cables towards all corners of the boxes; a tilt is offered, if less."""
     robot, rng, proofs = load(name), np.random.default_rng(3), []

@@ -102,7 +102,9 @@ def test_quadrotors_are_guessed_to_tilt_as_their_cables_pull():
 def test_short_motions_of_a_team_are_found():
     """With nothing in the way: the programs of teams are factorised in a way of their own, which must not fail here."""
     path = {"kind": "line", "start": [0, 0, 0], "end": [0.1, 0, 0]}
-    found = plan(load("multi-quadrotor-3"), {"path": path, "duration": 2, "base": {"kind": "free", "ends": "rest"}})
+    found = plan(
+        load("multi-quadrotor-3"), {"path": path, "duration": 2, "base": {"kind": "free", "ends": "rest"}, "steps": 16}
+    )
     assert found.feasible, found.message
 
 
@@ -111,7 +113,7 @@ def test_a_time_limit_ends_a_search():
     robot, took = load("multi-quadrotor-3"), []
     for limit in (0.01, 0.5):
         before = time.process_time()  # not the time on a clock, most of which other programs may have
-        found = plan(robot, there_and_back(steps=30, time_limit=limit))
+        found = plan(robot, there_and_back(steps=16, time_limit=limit))
         took.append(time.process_time() - before)
         assert found.status == "not-found"
         assert found.message == "time limit"

@@ -47,10 +47,6 @@ def wall(x, hole_low, hole_high, thickness=0.02):
 
 
 WALL_WITH_A_HOLE = wall(0.0, (0.3, 1.2), (0.6, 1.5))
-MAZE = [
-    box([-0.2005, -FAR, -FAR], [-0.1995, 0.25, FAR]),  # a millimetre thick
-    box([0.1995, -0.25, -FAR], [0.2005, FAR, FAR]),
-]
 CLOSED = wall(0.3, (0, 0), (1e-3, 1e-3))
 
 
@@ -72,15 +68,12 @@ def through_the_hole():
     return path
 
 
-@pytest.mark.parametrize("places", [WALL_WITH_A_HOLE, MAZE], ids=["wall", "maze"])
-def test_a_path_past_walls_is_clear_between_its_places_too(places, through_the_hole):
-    scenario = scenario_of(places)
+def test_a_path_past_walls_is_clear_between_its_places_too(through_the_hole):
+    scenario = scenario_of(WALL_WITH_A_HOLE)
     assert is_open(scenario)
     assert guess_exceeds(scenario, partial(usual_guess, scenario)) == "keep_out"
-    path = through_the_hole if places is WALL_WITH_A_HOLE else find_global_path(scenario)[0]
-    assert path is not None
-    platform, _ = path.space.poses(path.at(np.linspace(0, 1, FINE)))
-    assert min(outside(place, platform[:, :3]).min() for place in places) >= KEPT - 1e-6
+    platform, _ = through_the_hole.space.poses(through_the_hole.at(np.linspace(0, 1, FINE)))
+    assert min(outside(place, platform[:, :3]).min() for place in WALL_WITH_A_HOLE) >= KEPT - 1e-6
     np.testing.assert_array_equal(platform[[0, -1], :3], [LINE["start"], LINE["end"]])
     directions = ROBOT.home_anchors - platform[:, None, :3]
     directions /= np.linalg.norm(directions, axis=2, keepdims=True)
@@ -100,7 +93,7 @@ def test_pieces_are_clear_only_where_no_place_of_them_is_too_near():
     for _ in range(200):
         points = rng.uniform([-0.4, -0.3, 0.9], [0.4, 0.6, 1.1], (3, 3))
         ends_clear = clear.rest(*space.poses(points[[0, -1]])).slack.min() >= reserve
-        dense = np.concatenate([a + np.linspace(0, 1, FINE)[:, None] * (b - a) for a, b in pairwise(points)])
+        dense = np.concatenate([a + np.linspace(0, 1, 1501)[:, None] * (b - a) for a, b in pairwise(points)])
         nearest = min(outside(sheet, dense).min() for sheet in sheets)
         if not ends_clear or abs(nearest - reserve) < 1e-3:
             continue  # as the slope of the reserve and the finest pieces decide
@@ -155,13 +148,6 @@ def test_only_motions_that_may_go_anywhere_have_global_paths():
     assert not is_open(scenario_of([], tube={"position": "free", "ends": "free"}))
 
 
-def test_a_plan_goes_through_the_hole():
-    planned = plan(ROBOT, scenario_of(WALL_WITH_A_HOLE).task)
-    assert planned.feasible, planned.report()
-    positions = planned.audit.motion.pose[:, :3]
-    assert min(outside(place, positions).min() for place in WALL_WITH_A_HOLE) >= KEPT - 1e-5
-
-
 def test_a_path_is_searched_for_where_no_program_finds_a_motion_from_a_shifted_one(monkeypatch, through_the_hole):
     """The coarse program that starts from the shifted motion is made to fail: no finer one is solved from there."""
     solve, failed = Search.solve, []
@@ -187,10 +173,12 @@ def test_a_path_is_searched_for_where_no_program_finds_a_motion_from_a_shifted_o
     assert min(outside(place, positions).min() for place in WALL_WITH_A_HOLE) >= KEPT - 1e-5
 
 
-def test_the_same_task_is_planned_again_from_the_last_result():
+def test_a_plan_goes_through_the_hole_and_is_planned_again_from_the_last_result():
     planner = Planner(ROBOT, scenario_of(WALL_WITH_A_HOLE).task)
     first, second = planner.plan(), planner.plan()
-    assert first.feasible
+    assert first.feasible, first.report()
+    positions = first.audit.motion.pose[:, :3]
+    assert min(outside(place, positions).min() for place in WALL_WITH_A_HOLE) >= KEPT - 1e-5
     assert second.feasible
     assert "global path" in [stage.name for stage in first.stages]
     assert [stage.name.split(",")[0] for stage in second.stages] == ["ends and path", "nonlinear program", "audit"]
@@ -199,9 +187,7 @@ def test_the_same_task_is_planned_again_from_the_last_result():
     np.testing.assert_allclose(second.deviation.q, first.deviation.at(second.deviation.nodes).q, atol=0.01)
 
 
-@pytest.mark.parametrize(
-    ("scene", "posts"), [(window(2), GATE), (window(6), GATE), (forest(3), TREES)], ids=["gate-2", "gate-6", "trees-3"]
-)
+@pytest.mark.parametrize(("scene", "posts"), [(window(2), GATE), (forest(3), TREES)], ids=["gate-2", "trees-3"])
 def test_teams_squeeze_turn_and_slide_between_posts(scene, posts):
     robot, task = scene
     path, message = find_global_path(lay_out(robot, Task.model_validate(task)))

@@ -17,7 +17,7 @@ offsets = st.tuples(*[st.floats(-0.05, 0.05)] * 3)
 speeds = st.tuples(*[st.floats(-0.2, 0.2)] * 3)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(offset=offsets, angles=offsets, speed=speeds, turning=speeds)
 def test_the_motion_starts_as_measured_and_ends_at_rest(offset, angles, speed, turning):
     """Pose and speed at the start by differences of the audited poses; the end is the path's, at rest."""

@@ -78,7 +78,7 @@ def truth(points, p, p_end):
     return from_triangles(triangles_of(np.vstack([points - p, points - p_end])))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(body=bodies(), ends=places)
 def test_distances_from_a_mesh_are_those_of_its_triangles(body, ends):
     p, p_end = ends
@@ -90,7 +90,7 @@ def test_distances_from_a_mesh_are_those_of_its_triangles(body, ends):
     assert float(cable_outside(body, ca.DM(p), ca.DM(p_end))) == pytest.approx(truth(points, p, p_end), **exact)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(body=bodies(), ends=places)
 def test_a_program_can_follow_the_distance_from_a_mesh(body, ends):
     """Along each direction its derivative is that of differences, or lies between those on both sides of a corner."""
@@ -110,7 +110,7 @@ def test_a_program_can_follow_the_distance_from_a_mesh(body, ends):
         assert (slope.ravel() <= np.maximum(ahead, behind) + 1e-3).all()
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(ends=places, angles=arrays(np.float64, 3, elements=st.floats(-3, 3)))
 def test_a_turned_box_is_the_box_of_turned_points(ends, angles):
     """And the mesh of its corners, in another pose and unit, is the same body."""

@@ -59,9 +59,6 @@ IN_LEAST_TIME = {
 }
 CASES = [
     ("wang-ctmrts", "fixed-length", "effort", 25),
-    ("wang-ctmrts", "fixed-length", "time", 25),
-    ("wang-ctmrts", "variable-length", "effort", 25),
-    ("wang-ctmrts", "variable-length", "time", 25),
     ("wang-ctmrts", "both", "time", 12),
     ("wang-ctmrts-4", "fixed-length", "effort", 25),
     ("wang-ctmrts-4", "variable-length", "time", 12),

@@ -125,15 +125,14 @@ def test_the_rest_of_a_line_ends_at_rest_at_its_end(tube):
         assert np.abs(last.audit.motion.velocity[-1]).max() < 1e-7
 
 
-@pytest.mark.parametrize("scheme", ["linear", "hermite"])
-def test_teams_with_few_cables_go_on_too(scheme):
+def test_teams_with_few_cables_go_on_too():
     """Four robots carry the platform with a cable each: balance decides which tensions the rest starts with."""
     robot = load("wang-ctmrts-4")
     x, y, z = robot.home[:3]
     line = {"kind": "line", "start": [x, y, z], "end": [x + 0.2, y, z]}
     tube = {"position": 0.1, "attitude": 0.3}
     planner = Planner(
-        robot, {"path": line, "duration": 4, "tube": tube, "base": {"kind": "free"}, "steps": 16, "scheme": scheme}
+        robot, {"path": line, "duration": 4, "tube": tube, "base": {"kind": "free"}, "steps": 16, "scheme": "hermite"}
     )
     whole = planner.plan()
     assert whole.feasible

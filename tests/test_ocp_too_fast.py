@@ -32,7 +32,7 @@ def exceeded(limited, places, spread, rests):
     return {excess.limit for excess in too_fast(limited, TIMES, poses, off, *[np.array([rests])] * 2)}
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.booleans())
 def test_a_motion_that_exists_is_never_proven_too_fast(seed, rests):
     """Any motion inside a tube about places, with its own largest speeds and accelerations as limits."""
@@ -104,10 +104,9 @@ def test_a_circle_that_leaves_its_platform_behind_at_the_start_is_proven_too_fas
         assert infeasible_ends(lay_out(ROBOT, read_task(task | {"limits": limits}))) is None
 
 
-@pytest.mark.parametrize("tube", ["free", 0.05])
-def test_planning_ends_at_once_and_offers_a_duration(tube):
+def test_planning_ends_at_once_and_offers_a_duration():
     path = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}
-    task = {"path": path, "duration": 1, "steps": 20, "tube": {"position": tube}, "limits": {"platform_speed": 0.3}}
+    task = {"path": path, "duration": 1, "steps": 12, "tube": {"position": 0.05}, "limits": {"platform_speed": 0.3}}
     planned = plan(ROBOT, task)
     assert planned.status is MotionStatus.INFEASIBLE
     assert [stage.name for stage in planned.stages] == ["ends and path"]
@@ -192,10 +191,9 @@ def test_a_short_turn_about_an_origin_is_feasible_though_the_centre_of_mass_is_e
     assert plan(robot, task).feasible
 
 
-@pytest.mark.parametrize("name", ["ipanema-1", "planar-4"])
-def test_a_power_that_no_tensions_need_is_the_least_that_is_feasible(name):
+def test_a_power_that_no_tensions_need_is_the_least_that_is_feasible():
     """A percent less is proven infeasible; with a little more an audit finds tensions, without a program."""
-    robot = load(name)
+    robot = load("ipanema-1")
     start = np.array(robot.home[:3])
     line = {"kind": "line", "start": start.tolist(), "end": (start + np.array([0.3, 0.0, 0.2])).tolist()}
     task = {"path": line, "duration": 1.0}

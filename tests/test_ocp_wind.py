@@ -35,7 +35,7 @@ def in_hull(points, corners):
     )
 
 
-@pytest.mark.parametrize("aero", [{}, {"lift": 0.9}, {"lift": 0}, {"drag": 0, "lift": 0.3}, {"form": "printed"}])
+@pytest.mark.parametrize("aero", [{}, {"lift": 0}, {"drag": 0, "lift": 0.3}, {"form": "printed"}])
 def test_every_force_of_a_box_is_in_the_hull_of_the_decisive_ones(aero):
     robot, rng = flying(**aero), np.random.default_rng(3)
     dynamics = Dynamics(robot)
@@ -51,7 +51,7 @@ def test_every_force_of_a_box_is_in_the_hull_of_the_decisive_ones(aero):
         assert len(winds) <= 9
         assert ((winds >= low) & (winds <= high)).all()
         corners = dynamics.aerodynamic_wrench(pose, velocity, winds)[:, :3]
-        samples = rng.uniform(low, high, (60, 3))
+        samples = rng.uniform(low, high, (25, 3))
         assert in_hull(dynamics.aerodynamic_wrench(pose, velocity, samples)[:, :3], corners)
 
 
@@ -63,9 +63,9 @@ def test_every_force_of_a_disc_is_in_the_hull_of_the_decisive_ones(aero, speed):
     angle = rng.uniform(0, 2 * np.pi)
     velocity = np.array([speed * np.cos(angle), speed * np.sin(angle), 0.5, 0, 0, 0])
     winds = np.vstack(decisive_winds_at(disc, robot, pose[None], velocity[None]))
-    radius, angles = 5 * np.sqrt(rng.random(60)), rng.uniform(0, 2 * np.pi, 60)
+    radius, angles = 5 * np.sqrt(rng.random(25)), rng.uniform(0, 2 * np.pi, 25)
     radius[::2] = 5
-    samples = np.stack([radius * np.cos(angles), radius * np.sin(angles), np.zeros(60)], axis=1)
+    samples = np.stack([radius * np.cos(angles), radius * np.sin(angles), np.zeros(25)], axis=1)
     force = dynamics.aerodynamic_wrench(pose, velocity, samples)[:, :3]
     corners = dynamics.aerodynamic_wrench(pose, velocity, winds)[:, :3]
     assert in_hull(force, corners)
@@ -135,7 +135,7 @@ def test_what_still_air_allows_a_box_forbids_at_its_worst_wind():
     rng = np.random.default_rng(1)
     rows = np.arange(0, len(seen.times), 100)
     A = dynamics.wrench_matrix(seen.motion.pose[rows], seen.carriers.pose[rows])
-    for other in rng.uniform([-6, -1, 0], [0, 1, 0], (20, 3)):
+    for other in rng.uniform([-6, -1, 0], [0, 1, 0], (6, 3)):
         w = dynamics.required_wrench(*(part[rows] for part in (*seen.motion, *seen.carriers)), wind=other)
         proofs = (
             certify(TensionProblem(*pair, robot.t_min, robot.t_max, length=robot.length))
@@ -223,13 +223,13 @@ def test_a_free_motion_is_planned_so_that_every_wind_is_held():
     """At random instants, in winds of the box, a linear program finds tensions; without the box it does not."""
     robot = load("wang-flying")
     box = {"min": [-8, -8, 0], "max": [8, 8, 0]}
-    task = {"path": {**CIRCLE, "radius": 0.5}, "base": FREE, "steps": 30}
+    task = {"path": {**CIRCLE, "radius": 0.5}, "base": FREE, "steps": 20}
     calm, all_winds = plan(robot, {**task, "wind": [0, 0, 0]}), plan(robot, {**task, "wind": box})
     assert calm.feasible
     assert all_winds.feasible, all_winds.report()
     rng = np.random.default_rng(5)
     missed = 0
-    for _ in range(150):
+    for _ in range(80):
         row, wind = int(rng.integers(len(calm.audit.times))), rng.uniform(box["min"], box["max"])
         wind[:2] = np.where(rng.random(2) < 0.4, np.sign(wind[:2]) * 8, wind[:2])  # faces and corners too
         assert feasible_in(robot, all_winds.audit.motion, all_winds.audit.carriers, wind, row)
@@ -240,12 +240,12 @@ def test_a_free_motion_is_planned_so_that_every_wind_is_held():
 def test_a_free_motion_is_planned_so_that_wind_from_any_side_is_held():
     """At random instants, in winds of the disc, a linear program finds tensions."""
     robot = load("wang-flying")
-    task = {"path": {**CIRCLE, "radius": 0.5}, "base": FREE, "steps": 30, "wind": {"speed": 9}}
+    task = {"path": {**CIRCLE, "radius": 0.5}, "base": FREE, "steps": 20, "wind": {"speed": 9}}
     found = plan(robot, task)
     assert found.feasible, found.report()
     assert "any horizontal one up to 9 m/s" in found.report()
     rng = np.random.default_rng(5)
-    for _ in range(100):
+    for _ in range(60):
         row, angle = int(rng.integers(len(found.audit.times))), rng.uniform(0, 2 * np.pi)
         wind = 9 * np.array([np.cos(angle), np.sin(angle), 0])
         assert feasible_in(robot, found.audit.motion, found.audit.carriers, wind, row)

@@ -153,8 +153,7 @@ def test_minimum_time_on_a_line_agrees_with_an_optimal_control_program():
     assert timing.duration == pytest.approx(best, rel=0.01)
 
 
-@pytest.mark.parametrize("power", [None, 200.0])
-def test_motors_of_winches_give_the_minimum_time_of_an_optimal_control_program(power):
+def test_motors_of_winches_give_the_minimum_time_of_an_optimal_control_program():
     """Their inertia is the mass of the platform; every second motor can do more than its cable."""
     data = load("ipanema-1").model_dump()
     mass = data["platform"]["mass"]
@@ -164,11 +163,11 @@ def test_motors_of_winches_give_the_minimum_time_of_an_optimal_control_program(p
     ]
     robot = Robot.model_validate(data)
     path = straight(robot, [0.6, 0.4, 0.3, 0, 0, 0])
-    fastest = time_along(robot, along(path, limits={"winch_power": power}))
+    fastest = time_along(robot, along(path, limits={"winch_power": 200.0}))
     assert fastest.feasible
-    best = optimal_duration(robot, path.model_copy(update={"timing": "uniform"}), 200, power=power or np.inf)
+    best = optimal_duration(robot, path.model_copy(update={"timing": "uniform"}), 200, power=200.0)
     assert fastest.duration == pytest.approx(best, rel=0.005)
-    for name in ("winch_force", "winch_power") if power else ("winch_force",):
+    for name in ("winch_force", "winch_power"):
         assert any(name in each.limit for each in fastest.law.bottlenecks)
 
 
@@ -346,10 +345,10 @@ def test_a_blocked_arc_is_found_and_proven_for_every_speed():
     place, _ = timing.law.parametrised.at(np.array([timing.law.at]))
     top = 0.3 / np.linalg.norm(place.velocity[0, :3])
     rng = np.random.default_rng(1)
-    for _ in range(300):
-        motion = place.timed(np.array([rng.uniform(0, top)]), np.array([rng.normal() * 30]))
-        w = timing.law.parametrised.dynamics.required_wrench(*(part[0] for part in motion))
-        assert certificate.direction @ w - certificate.support >= certificate.shortfall - 1e-6
+    places, _ = timing.law.parametrised.at(np.full(300, timing.law.at))
+    motion = places.timed(rng.uniform(0, top, 300), rng.normal(size=300) * 30)
+    w = timing.law.parametrised.dynamics.required_wrench(*motion)
+    assert (w @ certificate.direction - certificate.support >= certificate.shortfall - 1e-6).all()
 
 
 def test_samples_and_timed_paths_are_taken_as_curves():
@@ -418,7 +417,7 @@ def test_a_leg_of_a_millimetre_is_timed_too():
     fewer = {"s": (*law.s[:-1:3], 1.0), "speeds": (*law.speeds[:-1:3], 0.0)}
     coarse = TimedPath.model_validate(law.model_dump() | fewer)
     found = plan(robot, {"path": coarse})
-    times = np.linspace(0, coarse.natural_duration, 200_001)
+    times = np.linspace(0, coarse.natural_duration, 50_001)
     motion, dynamics = coarse.at(times, times[-1]), Dynamics(robot)
     A, w = dynamics.wrench_matrix(motion.pose), dynamics.required_wrench(*motion)
     wider = solve_batch(A, w, robot.t_min - 1, robot.t_max + 1, length=robot.length)
@@ -429,7 +428,7 @@ def test_a_leg_of_a_millimetre_is_timed_too():
 
 def test_an_arc_of_many_chords_is_timed():
     robot = point_mass([[2, 2, 3], [-2, 2, 3], [-2, -2, 3], [2, -2, 3]], ["x", "y", "z"])
-    arc = [[0.5 * np.cos(angle), 0.5 * np.sin(angle), 0] for angle in np.linspace(0, np.pi, 80)]
+    arc = [[0.5 * np.cos(angle), 0.5 * np.sin(angle), 0] for angle in np.linspace(0, np.pi, 30)]
     timing = time_along(robot, along({"kind": "waypoints", "points": [*arc, [-0.5, -0.5, 0.3]]}))
     assert timing.feasible, timing.reason  # tensions are missing in a few bends: only there is the grid refined
 
@@ -567,7 +566,7 @@ def test_without_the_extra_it_says_how_to_install_it(monkeypatch):
         time_along(robot, along(straight(robot, [0, 0, 1, 0, 0, 0])))
 
 
-FACADE = [[x, 0.0, 0.4 + 0.2 * (k // 2)] for k, x in enumerate([-1, 1, 1, -1, -1, 1, 1, -1])]
+FACADE = [[x, 0.0, 0.4 + 0.2 * (k // 2)] for k, x in enumerate([-1, 1, 1, -1])]
 
 
 def test_a_facade_is_painted_at_a_steady_speed_with_gentle_ends():
@@ -575,7 +574,7 @@ def test_a_facade_is_painted_at_a_steady_speed_with_gentle_ends():
     path = {"kind": "waypoints", "points": FACADE, "blend": 0.002}
     timing = time_along("ipanema-1", {"path": path, "limits": {"platform_speed": 0.3, "platform_acceleration": 5}})
     assert timing.feasible
-    times = np.linspace(0, timing.duration, 40_001)
+    times = np.linspace(0, timing.duration, 20_001)
     platform, _ = timing.scenario.motion(times, None)
     position = platform.pose[:, :3]
     velocity = np.gradient(position, times, axis=0)

@@ -33,21 +33,23 @@ POINT, POINTS, PATHS = ("start", "end", "pose", "centre"), ("points", "poses"), 
 AnyKind = TypeVar("AnyKind", bound=PathBase)
 
 
-def shortest_shifts(scenario: Scenario, size: float, holds: Callable[[np.ndarray], bool]) -> Iterator[np.ndarray]:
+def shortest_shifts(scenario: Scenario, size: float, holds: Callable[[np.ndarray], np.ndarray]) -> Iterator[np.ndarray]:
     """Yield the shortest shift (3,) [m] along each axis and direction that `holds`, the shortest of all first.
 
-    `size` is the robot's size [m].
+    `size` is the robot's size [m]; `holds` is given shifts (k, 3), and returns which of them are long enough, (k,).
     """
-    ways = [sign * np.eye(3)[axis] for axis in POSITION if scenario.robot.dof_mask[axis] for sign in (1, -1)]
+    ways = np.kron(np.eye(3)[[axis for axis in POSITION if scenario.robot.dof_mask[axis]]], [[1], [-1]])
     for far in SHIFTS * size:
-        found = []
-        for k in [k for k, way in enumerate(ways) if holds(far * way)][::-1]:
-            way, low, high = ways.pop(k), far / STEP, far
-            for _ in range(HALVINGS):
-                middle = (low + high) / 2
-                low, high = (low, middle) if holds(middle * way) else (middle, high)
-            found.append((high, way))
-        yield from (high * way for high, way in sorted(found, key=lambda pair: pair[0]))
+        if not len(ways):
+            return
+        far_enough = holds(far * ways)
+        found, ways = ways[far_enough][::-1], ways[~far_enough]
+        low, high = np.full((2, len(found), 1), [[[far / STEP]], [[far]]])
+        for _ in range(HALVINGS if len(found) else 0):
+            middle = (low + high) / 2
+            enough = holds(middle * found)[:, None]
+            low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+        yield from (high * found)[np.argsort(high[:, 0], kind="stable")]
 
 
 def nearer_end(scenario: Scenario) -> Change | None:
@@ -119,14 +121,24 @@ def shortest_shift(scenario: Scenario, balance: bool = True) -> np.ndarray | Non
         return None
     platform, carriers = scenario.motion(np.linspace(0.0, scenario.duration, PLACES), None)
     size = float(np.linalg.norm(np.ptp(robot.home_anchors, axis=0)))
-    kept = AtRest(scenario, size, balance=balance)
+    kept, worst = AtRest(scenario, size, balance=balance), 0
 
-    def holds(by: np.ndarray) -> bool:
-        poses = platform.pose.copy()
-        poses[:, :3] += by
-        return bool((kept(poses, carriers.pose).slack >= 0).all())
+    def slack(by: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """Return the slack of each shift (k, 3) at some places of the path, (k, places)."""
+        poses = np.tile(platform.pose[places], (len(by), 1, 1))
+        poses[..., :3] += by[:, None]
+        return kept(poses.reshape(-1, 6), np.tile(carriers.pose[places], (len(by), 1, 1))).slack.reshape(len(by), -1)
 
-    return None if holds(np.zeros(3)) else next(shortest_shifts(scenario, size, holds), None)
+    def holds(by: np.ndarray) -> np.ndarray:
+        nonlocal worst
+        enough = slack(by, np.array([worst]))[:, 0] >= 0  # most shifts fail where the one before did
+        if enough.any():
+            everywhere = slack(by[enough], np.arange(PLACES))
+            worst = int(everywhere[everywhere.min(axis=1).argmin()].argmin())
+            enough[enough] = (everywhere >= 0).all(axis=1)
+        return enough
+
+    return None if holds(np.zeros((1, 3)))[0] else next(shortest_shifts(scenario, size, holds), None)
 
 
 def shifted_path(scenario: Scenario, shortest: np.ndarray | None) -> Change | None:

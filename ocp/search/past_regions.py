@@ -194,15 +194,15 @@ def _nearest(kept: AtRest, pose: np.ndarray, carriers: np.ndarray, beside: np.nd
     size = float(np.linalg.norm(np.ptp(np.vstack([scenario.robot.home_anchors, start, beside]), axis=0)))
     step = 10.0 ** np.floor(np.log10(size / STEPS))
 
-    def holds(*moved: np.ndarray) -> bool:
-        return bool((_slack(kept, pose, carriers, np.array(moved)) >= 0).all())
+    def holds(moved: np.ndarray) -> np.ndarray:
+        return _slack(kept, pose, carriers, moved) >= 0
 
     def clear() -> Iterator[np.ndarray]:
         """Yield the nearest clear positions, a step farther than necessary, at a round distance."""
         for shift in shortest_shifts(scenario, size, holds):
             far = np.linalg.norm(shift)
             by = shift * (step * (np.ceil(far / step) + 1) / far)
-            if holds(by):
+            if holds(by[None])[0]:
                 yield start + by
 
     places = clear()
@@ -213,7 +213,7 @@ def _nearest(kept: AtRest, pose: np.ndarray, carriers: np.ndarray, beside: np.nd
     lines = (
         (place, [place - start + share * (other - place) for other in beside]) for place in chain([nearest], places)
     )
-    return next((place for place, ways in lines if holds(*np.vstack(ways))), nearest)
+    return next((place for place, ways in lines if holds(np.vstack(ways)).all()), nearest)
 
 
 def _slack(kept: AtRest, pose: np.ndarray, carriers: np.ndarray, moved: np.ndarray) -> np.ndarray:
