@@ -13,7 +13,7 @@ COGIRO = load("cogiro")
 BAG = {"mass": 150.0, "com": [0.1, 0.05, -0.3], "inertia": [8, 9, 6, 0, 0.5, 0]}
 PICKED, RELEASED = 1.5, 3.0  # [s]
 LATE = {"delay": 0.03, "stamped": True}
-PERIOD = 2.5e-3  # [s]
+PERIOD = 4e-3  # [s]
 
 
 @pytest.fixture(scope="module")

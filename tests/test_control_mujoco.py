@@ -134,7 +134,7 @@ def test_all_at_once_with_encoders_and_a_known_lag_leaves_a_millimetre(circle):
 def test_all_at_once_leaves_a_millimetre_of_a_suspended_robot():
     """Slow and soft winches that give nine tenths, a tenth more of mass, friction, and a delay: the delay is 5 mm."""
     pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")
-    task, differs = shorter(cogiro(), 1200), WINCHES["no encoder, winch loop, gain 0.9, with times"]
+    task, differs = coarser(cogiro(), 600), WINCHES["no encoder, winch loop, gain 0.9, with times"]
     assert fly(task, ComputedTorque(task.robot, 20.0, observer=30.0, tension_loop=20.0), **differs).rms < 1e-3
     ahead = Predictive(task.robot)
     assert fly(task, ahead, **differs).rms < 5e-4
@@ -254,11 +254,11 @@ def test_an_attitude_loop_is_slowed_down_before_late_rotors_make_it_unstable():
     still = np.zeros_like(robot.carrier_home)
     pulls = tensions(robot, robot.home, method="soft-wrench").tensions
     rest = Reference(robot.home, *np.zeros((2, 6)), robot.carrier_home, still, still, pulls)
-    task = Task(robot, [rest] * 1500, None, Hardware(stiffness=2e4, damping=50.0), (2, 1.5, 0.3), 1.0, 0.1)
+    task = Task(robot, [rest] * 750, None, Hardware(stiffness=2e4, damping=50.0), (2, 1.5, 0.3), 1.0, 0.1, 2e-3)
     controller = ComputedTorque(robot)
     assert fly(task, controller, **TEAMS["rotor lag 60 ms"]).error.max() < 0.05
     assert controller._platform["attitude"][0] < 28
-    fly(shorter(task, 500), controller, **TEAMS["rotor lag 30 ms"])
+    fly(shorter(task, 250), controller, **TEAMS["rotor lag 30 ms"])
     assert controller._platform["attitude"][0] == 40
 
 
@@ -375,7 +375,7 @@ def test_noise_and_pushes_on_a_team_are_no_reason_to_give_predictions_up():
     noise = {"position": 1e-3, "velocity": 1e-2, "attitude": 1e-3, "attitude_rate": 1e-2}
     push = 0.1 * robot.weight * np.array([1, 0.5, -0.5, 0, 0, 0])
     for conditions in ({"noise": noise}, {"disturbance": push}):
-        flight = simulate(robot, robot.home, controller, duration=0.5, **conditions)
+        flight = simulate(robot, robot.home, controller, duration=0.5, period=2e-3, **conditions)
         assert flight.handed_over is None, conditions
 
 

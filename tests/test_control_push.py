@@ -16,7 +16,7 @@ def test_a_load_returns_after_a_push(name):
     """Carriers once stayed where the push had moved them along their cables, and the load hung 70 to 90 mm too high."""
     robot = slung(dof=["x", "y", "z"]) if name == "slung" else load(name)
     push = f"push {0.2 * robot.weight} 0 0 at 0.2 for 0.5"
-    flown = simulate(robot, robot.home, events=[push], duration=6, period=0.002)
+    flown = simulate(robot, robot.home, events=[push], duration=6, period=0.004)
     off = np.linalg.norm(flown.trajectory["pose"].values[:, :3] - robot.home[:3], axis=1)
     assert off.max() > 0.1  # it was pushed
     assert off[-1] < 0.006
@@ -82,7 +82,7 @@ def test_a_load_whose_six_cables_nearly_meet_at_its_axis_is_turned_by_its_carrie
     push = f"push {0.05 * robot.weight} {-0.03 * robot.weight} 0 at 0.2 for 0.3"
     errors = []
     for controller in (Predictive(robot), ComputedTorque(robot)):
-        run = simulate(robot, robot.home, controller, events=[push], duration=1.2, period=0.002)
+        run = simulate(robot, robot.home, controller, events=[push], duration=1.2, period=0.004)
         errors.append(run.error.max())
         if isinstance(controller, Predictive):
             assert run.answered["as planned"] == len(run.error)

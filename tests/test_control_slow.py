@@ -11,6 +11,7 @@ from towline.control import ComputedTorque, Predictive, Reference, State
 from towline.models.points import rotations
 from towline.statics.distribution import tensions
 
+pytestmark = pytest.mark.usefixtures("stable_at_home")
 PERIODS = [0.05, 0.1, 0.15]
 
 
@@ -221,12 +222,11 @@ def body_rates(motions):
     return np.stack([dr - sp * dy, cr * dp + sr * cp * dy, cr * cp * dy - sr * dp], axis=1)
 
 
-def test_what_carriers_are_ordered_does_not_move_them_before_they_turn(monkeypatch):
+def test_what_carriers_are_ordered_does_not_move_them_before_they_turn():
     """A late state of a team at rest is one that has moved by the thrusts, torques and tensions sent since.
 
     By Newton's and Euler's laws for carriers that have hardly turned yet, and whose cables end at their CoM.
     """
-    monkeypatch.setattr("towline.control.predictive.grows", lambda *_: False)  # to save its simulation
     robot, nothing = load("multi-quadrotor-3"), np.zeros(6)
     still, rest = np.zeros_like(robot.carrier_home), tensions(robot, robot.home).tensions
     away, most = np.array([0.05, 0, 0, 0, 0, 0]), 0.0

@@ -294,7 +294,7 @@ def test_a_stop_is_simulated_as_a_plan_is(made):
 def test_a_simulation_stops_at_an_event(made):
     robot, found = made
     at = 0.4 * found.duration
-    run = simulate(robot, found, events=[f"stop at {at:.6f}"])
+    run = simulate(robot, found, events=[f"stop at {at:.6f}"], period=2e-3)
     assert run.passed
     its = stop(found, at)
     last = run.references[-1]
@@ -302,7 +302,7 @@ def test_a_simulation_stops_at_an_event(made):
     np.testing.assert_allclose(last.velocity, 0.0, atol=1e-9)
     size = f"{its.duration:.4g} s and {its.distance:.4g} m at {at:.4g} s"
     assert f"the reference began a stop of {size}" in run.report()
-    both = simulate(robot, found, events=[f"stop at {at:.6f}"], runs=2)
+    both = simulate(robot, found, events=[f"stop at {at:.6f}"], period=2e-3, runs=2)
     assert both["passed"].values.all()
 
 

@@ -303,7 +303,9 @@ def test_carriers_with_two_cables_keep_the_path_of_their_hooks():
         pull = -(its.tensions[:, None, mine] * A[:, :3, mine]).sum(axis=2)
         thrust = np.linalg.norm(carrier.mass * (bends[:, index, :3] - g) - pull, axis=1)
         assert (thrust < carrier.thrust_max).all()
-    flown = simulate(robot, found, ComputedTorque(robot), duration=1.5 + its.duration + 0.2, events=["stop at 1.5"])
+    flown = simulate(
+        robot, found, ComputedTorque(robot), duration=1.7 + its.duration, period=2e-3, events=["stop at 1.5"]
+    )
     assert flown.passed
     assert flown.error.max() < 1e-3
 
@@ -387,7 +389,9 @@ def test_stops_of_flying_carriers_with_winches_obey_the_equations_of_motion(name
             along = (R[:, k, :, 2] * force).sum(axis=1)
             assert (along < carrier.thrust_max).all()
             assert np.linalg.norm(force - along[:, None] * R[:, k, :, 2], axis=1).max() < 0.02 * along.max()
-    run = simulate(robot, found, ComputedTorque(robot), duration=1.2 + its.duration + 0.3, events=["stop at 1.2"])
+    run = simulate(
+        robot, found, ComputedTorque(robot), duration=1.5 + its.duration, period=2e-3, events=["stop at 1.2"]
+    )
     assert run.passed
     assert run.error.max() < 2e-3
 

@@ -25,9 +25,9 @@ def test_every_file_is_used():
 def test_a_better_robot_is_found(command, monkeypatch):
     """From the robot's own layout until the audits agree: the result does not depend on the machine's speed."""
     monkeypatch.setattr(searching, "_SEARCHING", 0.0)
-    monkeypatch.setattr(searching, "AUDITED", 10_000)  # of larger audits, test_design.py has tests
+    monkeypatch.setattr(searching, "AUDITED", 3000)  # of larger audits, test_design.py has tests
     for module in (run, searching):
-        monkeypatch.setattr(module, "ROOM_AUDITED", 2000)
+        monkeypatch.setattr(module, "ROOM_AUDITED", 600)
     monkeypatch.chdir(FOLDER)
     _, _, given, file = shlex.split(command)
     assert Path(file).read_text().startswith(f"# {command}\n")

@@ -147,7 +147,7 @@ def test_forces_of_a_flight_are_in_balance_with_wind(robot, circle):
     forces = drag(robot, data["wind"].values - velocity)
     units, _ = pulls(robot, pose, carriers)
     given = np.einsum("nij,nj->ni", units, data["tensions"].values) + forces
-    wanted = robot.platform.mass * (np.gradient(velocity, PERIOD, axis=0) - GRAVITY)
+    wanted = robot.platform.mass * (np.gradient(velocity, flights.STEP, axis=0) - GRAVITY)
     off = np.linalg.norm(given - wanted, axis=1)
     assert np.linalg.norm(forces, axis=1).max() > 1.5
     assert np.median(off) < 0.03
@@ -179,7 +179,7 @@ def test_the_wind_of_figure_5_changes_the_tensions_by_its_force(robot, circle):
     change = np.linalg.solve(A, np.hstack([-force, 0 * force])[..., None])[..., 0]
     planned = circle.stays.references
     tensions = np.stack([reference.tensions for reference in planned])
-    most = 100 * np.abs(change[:-1] / tensions).max()
+    most = 100 * np.abs(change[:-1:2] / tensions).max()  # references are 2 ms apart
     assert float(claim.computed.removesuffix(" %")) == pytest.approx(most, abs=1)
 
 
@@ -208,7 +208,7 @@ def test_a_repair_states_what_its_quadrotor_does(circle):
     data = circle.gives.trajectory
     carrier = data["carrier_pose"].values[:, 0]
     assert np.abs(carrier[:, 3:]).max() < 1e-9
-    bend = np.diff(carrier[::20, :2], 2, axis=0) / (20 * PERIOD) ** 2
+    bend = np.diff(carrier[::10, :2], 2, axis=0) / (10 * flights.STEP) ** 2
     claim = flights._followed("VI.B-flown", "circle", {"circle": circle})
     (stated,) = re.findall(r"horizontal accelerations of up to ([\d.]+) m/s\^2", claim.why)
     assert float(stated) == pytest.approx(np.linalg.norm(bend, axis=1).max(), rel=0.15)
@@ -232,12 +232,12 @@ def test_no_tensions_hold_the_platform_where_the_quadrotor_hovers(robot, hoverin
         for one, wanted in zip(A, force, strict=True)
     ]
     stays, gives = hovering
-    assert np.mean(without) == pytest.approx(1 - stays.answered["as planned"] / 10_000, abs=0.05)
-    assert gives.answered["as planned"] == 10_000
+    assert np.mean(without) == pytest.approx(1 - stays.answered["as planned"] / 5000, abs=0.05)
+    assert gives.answered["as planned"] == 5000
     # Along x and y the quadrotor is where the load hangs in the wind as without: its pull leans by F_e / (m g).
-    air = gives.trajectory["wind"].values[5000]
+    air = gives.trajectory["wind"].values[2500]
     lean = 0.9 * drag(robot, air[None])[0, :2] / (robot.platform.mass * 9.81)
-    offset = (gives.trajectory["carrier_pose"] - gives.trajectory["carrier_reference"]).values[5000, 0, :2]
+    offset = (gives.trajectory["carrier_pose"] - gives.trajectory["carrier_reference"]).values[2500, 0, :2]
     assert np.dot(offset, lean) < 0
     assert 0.5 < np.linalg.norm(offset) / np.linalg.norm(lean) < 2
 

@@ -587,10 +587,10 @@ def test_a_motion_that_no_numbers_hold_never_passes():
 def test_processes_fly_as_one_does_and_refuse_what_they_cannot_receive():
     """Also with a checkpoint, of which a part is lost."""
     robot = load("wang-flying")
-    given = {"noise": NOISE, "duration": 0.02, "runs": 251}
+    given = {"noise": NOISE, "duration": 0.02, "runs": 101}
     alone, done = simulate(robot, robot.home, **given), []
     assert alone.identical(simulate(robot, robot.home, **given, workers=2, progress=lambda *all: done.append(all)))
-    assert done[-1] == (251, 251, int(alone["passed"].sum()))
+    assert done[-1] == (101, 101, int(alone["passed"].sum()))
     assert len(done) >= 4
     with pytest.raises(InputError, match="workers must be 1"):
         simulate(
