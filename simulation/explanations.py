@@ -1,6 +1,7 @@
 """`Matching`: a recording compared with its plant, and which of the model's parameters explains the difference."""
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -211,6 +212,26 @@ class Matching:
             old, new, sigma = (_plain(one) for one in (before, value, sigma))
             found.append((Explanation(name, old, new, sigma, explained, bool(shown), named), match))
         return sorted(found, key=lambda one: (not one[0].named, not one[0].shown, -weight(one[0])))
+
+
+def fitted_again(windows: Windows, one: Explanation, parameters: Parameters) -> tuple[Explanation, Matching]:
+    """Return an explanation fitted from starts that suit it, and the residuals with its value, given as `parameters`.
+
+    Starts that were corrected for a model with a large error explain a part of that.
+    """
+    for _ in range(2 * STEPS):
+        anew = copy(windows)
+        anew.start, anew.noise = np.zeros_like(windows.start), dict(windows.noise)
+        matching = Matching(anew, parameters)
+        if one.name not in ALONE:
+            break
+        match, sigma = matching.fitted(matching.first, one.name, matching.kept)
+        change = getattr(match.parameters, one.name) - one.value
+        if not abs(change) > one.sigma:
+            break
+        parameters = match.parameters
+        one = one._replace(value=one.value + change, sigma=_plain(sigma))
+    return one, matching
 
 
 def applicable(windows: Windows) -> Sequence[str]:

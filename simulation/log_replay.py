@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -25,7 +24,7 @@ from ..figures.report import Report, Reported, Section, Table
 from ..models.files import AnyRobot, as_robot
 from ..models.parsing import to_yaml
 from ..models.robot import Robot
-from .explanations import ALONE, Explanation, Matching, tied
+from .explanations import ALONE, Explanation, Matching, fitted_again, tied
 from .replayed_robot import Parameters, changed, friction_of
 from .windows import Windows
 
@@ -314,14 +313,13 @@ def replay(
     recorded = read_recorded(the_robot, log, poses, fields, flag("fix", fix))
     windows = Windows(recorded, drive, lasting)
     matching = Matching(windows, windows.usual._replace(delay=late))
-    found = matching.explanations(matching.first, matching.kept)
+    (most, match), *others = matching.explanations(matching.first, matching.kept)
     explained = None
-    if found[0][0].named and not windows.recorded.doubt:
-        again = copy(windows)  # whose starts suit what explains most
-        again.start, again.noise = np.zeros_like(windows.start), dict(windows.noise)
-        explained = _by_kind(Matching(again, found[0][1].parameters))
-    fitted, validation = _fitted(matching, found[0][0]) if fits else (None, None)
-    return Replay(matching, tuple(one for one, _ in found), explained, fitted, validation, largest)
+    if most.named and not windows.recorded.doubt:
+        most, again = fitted_again(windows, most, match.parameters)
+        explained = _by_kind(again)
+    fitted, validation = _fitted(matching, most) if fits else (None, None)
+    return Replay(matching, (most, *(one for one, _ in others)), explained, fitted, validation, largest)
 
 
 def _fitted(matching: Matching, most: Explanation) -> tuple[Parameters, tuple[float, float]]:
