@@ -94,7 +94,7 @@ def test_where_no_formation_exists_the_missing_wrench_is_named():
 def test_the_others_carry_the_load_to_rest(prepared):
     name, lost, most = "multi-quadrotor-4", "quad1", 0.2
     robot, controller = load(name), prepared
-    given = {"duration": 2.3, "period": 2e-3, "events": [f"lose {lost} at 0.2"], "tolerance": most}
+    given = {"duration": 2.3, "period": 4e-3, "events": [f"lose {lost} at 0.2"], "tolerance": most}
     run = simulate(robot, robot.home, controller, **given)
     cable = int(lost[-1]) - 1
     assert run.error.max() < most

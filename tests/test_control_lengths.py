@@ -132,7 +132,7 @@ def test_at_rest_the_lengths_give_the_planned_tensions(name):
 
 def test_a_constant_error_of_the_model_is_integrated_away(model):
     true = elastic("cogiro", 0.8 * EA)
-    run = simulate(true, true.home, LengthControl(model), duration=4.0, period=PERIOD)
+    run = simulate(true, true.home, LengthControl(model), duration=4.0, period=2 * PERIOD)
     assert run.error.max() > 1e-3
     assert run.error[-1] < 2e-5
 
@@ -150,7 +150,7 @@ def test_an_old_state_is_compared_with_the_plan_of_its_time(model, motion):
 def test_gains_for_another_age_are_not_kept_quiet(model, motion):
     late = {"delay": 0.02}
     other = elastic("cogiro", 0.8 * EA)
-    run = simulate(other, motion, LengthControl(model), noise=late, duration=5.0, period=PERIOD)
+    run = simulate(other, motion, LengthControl(model), noise=late, duration=3.4, period=PERIOD)
     assert not run.passed
     assert run.answered["hold"] > 0
 
@@ -393,7 +393,7 @@ def test_noise_of_known_sensors_hardly_changes_tensions(model):
 
 def test_a_known_delay_without_stamps_is_the_age_of_the_pose(model, motion):
     late = {"delay": 0.02}
-    known = simulate(model, motion, LengthControl(model, sensors=late), noise=late, period=PERIOD)
+    known = simulate(model, motion, LengthControl(model, sensors=late), noise=late, period=PERIOD, duration=3.4)
     assert known.error.max() < 5e-3
 
 

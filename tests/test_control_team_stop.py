@@ -92,7 +92,7 @@ def test_a_team_stops_in_a_simulation(made, stable_at_home):
     robot, found = made
     its = stop(found, 0.4 * found.duration)
     assert its.duration < 0.75 * (found.duration - its.begins)  # durations up to what is left are tried closely
-    flown = simulate(robot, its, Predictive(robot), duration=its.duration + 0.3, period=2e-3)
+    flown = simulate(robot, its, Predictive(robot), duration=its.duration + 0.3, period=4e-3)
     assert flown.passed
     assert flown.error.max() < 0.01
     assert flown.answered["as planned"] > 0.99 * len(flown.error)

@@ -96,15 +96,14 @@ def copied(factory, folder):
 
 @pytest.fixture(scope="module")
 def editable(tmp_path_factory):
-    """Return an environment with an editable installation, built twice, as `make demo` makes one; and its sources."""
+    """Return an environment with an editable installation, as `make demo` makes one, and its sources."""
     if sys.platform == "win32":
         pytest.skip("links need permission here; the import hook takes their place")
     folder = tmp_path_factory.mktemp("editable")
     sources = copied(tmp_path_factory, folder / "sources")
     (sources / ".editable").mkdir()
     (sources / ".editable" / "towline").symlink_to("nowhere", target_is_directory=True)
-    for _ in range(2):
-        wheel = build("editable", sources)
+    wheel = build("editable", sources)
     venv.create(folder / "environment", symlinks=True)
     packages = sysconfig.get_path("purelib", vars={"base": str(folder / "environment")})
     with ZipFile(wheel) as archive:
@@ -143,7 +142,7 @@ def test_editors_complete_the_names_of_an_editable_installation(editable):
 
 
 def test_only_what_changed_is_compiled(editable):
-    """With a compiler that always fails: an installation of the same sources does without, one of others does not."""
+    """With a compiler that always fails: a second installation of the sources does without, one of others does not."""
     sources = editable[1]
     code = f"{BACKEND}; backend.build_editable('dist')"
     extension = next((sources / "core").glob("_core.*[od]"))

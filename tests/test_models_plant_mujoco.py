@@ -12,7 +12,7 @@ from towline.plant import Plant
 
 mujoco = pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")
 
-STEP, BLOCK, BLOCKS = 1e-5, 2500, 10  # a quarter of a second
+STEP, BLOCK, BLOCKS = 1e-5, 2500, 6  # 0.15 s
 ROBOTS = {
     "wang-flying": 13_000.0,  # a prescribed base
     "wang-flying-quadrotor": 13_000.0,

@@ -27,7 +27,7 @@ if __name__ == "__main__":
 """
 
 
-def fly(file, runs=300, **changed):
+def fly(file, runs=150, **changed):
     robot = load("wang-flying")
     return simulate(robot, robot.home, **GIVEN | changed, runs=runs, checkpoint=file, resume=True)
 
@@ -86,7 +86,7 @@ def stored(file):
 @pytest.mark.parametrize(
     ("changed", "name"),
     [
-        ({"runs": 301}, "seeds"),
+        ({"runs": 151}, "seeds"),
         ({"seed": 6}, "seeds"),
         ({"gusts": 2.0}, "wind"),
         ({"duration": 0.04}, "reference"),

@@ -105,7 +105,7 @@ def test_new_keys_do_not_change_the_noise_of_old_ones(robot):
 @pytest.mark.parametrize(("controller", "gain"), [(ComputedTorque, 0.5), (Predictive, 0.3)])
 def test_a_known_delay_costs_little(robot, motion, controller, gain):
     """With the time of the measurement controllers predict from it; without, they fly by old states."""
-    late, often = {"delay": 0.005}, {"period": 2e-3, "duration": 1.5}
+    late, often = {"delay": 0.005}, {"period": 5e-3, "duration": 1.5}
     unknown = simulate(robot, motion, controller(robot), noise=late, **often)
     known = simulate(robot, motion, controller(robot), noise={**late, "stamped": True}, **often)
     slow = simulate(robot, motion, controller(robot), noise={"rate": 50, "delay": 0.03, "stamped": True}, **often)
