@@ -220,18 +220,23 @@ def fitted_again(windows: Windows, one: Explanation, parameters: Parameters) -> 
     Starts that were corrected for a model with a large error explain a part of that.
     """
     for _ in range(2 * STEPS):
-        anew = copy(windows)
-        anew.start, anew.noise = np.zeros_like(windows.start), dict(windows.noise)
-        matching = Matching(anew, parameters)
+        matching = _begun_with(windows, parameters)
         if one.name not in ALONE:
-            break
+            return one, matching
         match, sigma = matching.fitted(matching.first, one.name, matching.kept)
         change = getattr(match.parameters, one.name) - one.value
         if not abs(change) > one.sigma:
-            break
+            return one, matching
         parameters = match.parameters
         one = one._replace(value=one.value + change, sigma=_plain(sigma))
-    return one, matching
+    return one, _begun_with(windows, parameters)
+
+
+def _begun_with(windows: Windows, parameters: Parameters) -> Matching:
+    """Return the comparison with starts that are corrected for these parameters alone."""
+    anew = copy(windows)
+    anew.start, anew.noise = np.zeros_like(windows.start), dict(windows.noise)
+    return Matching(anew, parameters)
 
 
 def applicable(windows: Windows) -> Sequence[str]:
