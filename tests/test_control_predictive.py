@@ -158,7 +158,7 @@ def test_carriers_with_two_cables_have_one_coordinate():
     control_coordinates(record_of(robot), controller._moved.tethers, both, found)
     np.testing.assert_allclose(found[0], motion[:, 6:], atol=1e-5)
     push = 0.05 * 9.81 * robot.platform.mass * np.array([1, 0.5, -0.5, 0, 0.05, 0])
-    flight = simulate(robot, robot.home, duration=1.5, period=PERIOD, controller=controller, disturbance=push)
+    flight = simulate(robot, robot.home, duration=1.5, period=2 * PERIOD, controller=controller, disturbance=push)
     assert flight.error[-1] < 1e-3
 
 
@@ -177,7 +177,7 @@ def test_a_carrier_with_three_cables_is_where_the_load_has_it():
     lengths = Dynamics(robot).cable_lengths(motion[0], commanded[:, 0])
     np.testing.assert_allclose(lengths, robot.fixed_lengths, atol=1e-12)
     push = [1, 0, 0, 0, 0, 0]
-    given = {"duration": 1.0, "period": PERIOD, "disturbance": push}
+    given = {"duration": 1.0, "period": 2 * PERIOD, "disturbance": push}
     flights = [simulate(robot, robot.home, law(robot), **given) for law in LAWS]
     assert flights[0].error.max() < 0.5 * flights[1].error.max()
 
@@ -365,7 +365,7 @@ def test_a_tube_is_kept_that_a_push_would_leave():
     robot = load("multi-quadrotor-3")
     push = 0.1 * 9.81 * robot.platform.mass * np.array([1, 0.5, -0.5, 0, 0, 0])
     law = Predictive(robot, bandwidth=3, tube=0.02)
-    assert simulate(robot, robot.home, law, duration=0.8, period=PERIOD, disturbance=push).error.max() < 0.022
+    assert simulate(robot, robot.home, law, duration=0.8, period=2 * PERIOD, disturbance=push).error.max() < 0.022
 
 
 def test_a_platform_goes_around_a_body_on_its_way():

@@ -52,7 +52,7 @@ def crane():
 @pytest.mark.parametrize("name", LINES)
 def test_a_robot_of_each_kind_flies_its_plan(name):
     change, task = LINES[name]
-    flight = simulate(name, planned(name, change, **task), period=2e-3, tolerance=2e-3)
+    flight = simulate(name, planned(name, change, **task), period=4e-3, tolerance=2e-3)
     assert flight.passed, flight.report()
     assert flight.error[-1] < 1e-3
 
