@@ -377,13 +377,13 @@ def test_fewer_cables_than_coordinates_give_what_they_can(name):
     robot = load(name)
     end = (robot.home[:3] + np.array([0.2, 0.1, 0.1])).tolist()
     line = {"kind": "line", "start": robot.home[:3].tolist(), "end": end}
-    calm = simulate(robot, line, ComputedTorque(robot), duration=2.0, period=2e-3)
+    calm = simulate(robot, line, ComputedTorque(robot), duration=2.0, period=4e-3)
     status = np.where(calm.error > calm.tolerance, "off the reference", "as planned")
     assert [ANSWERS[each] for each in calm.record.answered] == status.tolist()
     push = 0.5 * robot.weight * np.array([1, 0.4, 0, 0, 0, 0])
-    pushed = simulate(robot, robot.home, ComputedTorque(robot), duration=1.5, period=2e-3, disturbance=push)
+    pushed = simulate(robot, robot.home, ComputedTorque(robot), duration=1.5, period=4e-3, disturbance=push)
     assert pushed.error.max() > 0.2
-    assert pushed.answered["soft wrench"] > 250
+    assert pushed.answered["soft wrench"] > 125
 
 
 def test_carriers_react_to_what_the_plan_does_not_know_alone():
