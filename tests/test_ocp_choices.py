@@ -84,7 +84,7 @@ def test_exact_waypoints_are_passed_though_the_tube_is_used():
 
 
 STATIONS = [[0, 0, 1], [2, -1, 1], [2, 1, 1.5], [-2, 1, 1.5], [-2, -1, 1.2], [0, 0, 1]]
-TOUR = {"duration": {"min": 0.5, "max": 20}, "objective": {"time": 0.1, "jerk": 1000}, "steps": 32}
+TOUR = {"duration": {"min": 0.5, "max": 20}, "objective": {"time": 0.1, "jerk": 1000}, "steps": 24}
 
 
 def test_points_are_passed_when_it_is_best():

@@ -236,7 +236,7 @@ def test_minimum_time_on_a_curve_agrees_with_an_optimal_control_program():
 
 def test_grids_hardly_matter_and_margins_cost_time():
     robot = load("cogiro")
-    durations = [time_along(robot, along(ROUND_TRIP), grid=grid).duration for grid in (50, 400)]
+    durations = [time_along(robot, along(ROUND_TRIP), grid=grid).duration for grid in (50, 200)]
     assert np.ptp(durations) < 3e-3 * durations[-1]
     assert durations[-1] == min(durations)
     slower = [time_along(robot, along(ROUND_TRIP, margin=margin)).duration for margin in (20.0, 60.0)]
@@ -330,10 +330,10 @@ def test_hovering_quadrotor_cannot_start_the_papers_circle(tmp_path):
 
 
 def test_a_blocked_arc_is_found_and_proven_for_every_speed():
-    robot, angles = load("wang-flying"), np.linspace(0, np.pi / 2, 4)
+    robot, angles = load("wang-flying"), np.linspace(0, np.pi / 4, 3)
     arc = [(0.4 * np.cos(angle), 0.4 * np.sin(angle), -1) for angle in angles]
     path = WaypointPath(
-        kind="waypoints", frame="quad", points=((0, 0, -1), (0.2, 0, -1), *arc, (0, 0.2, -1), (0, 0, -1))
+        kind="waypoints", frame="quad", points=((0, 0, -1), (0.2, 0, -1), *arc, (0.14, 0.14, -1), (0, 0, -1))
     )
     timing = time_along(robot, along(path, limits={"platform_speed": 0.3}))
     assert timing.status is MotionStatus.INFEASIBLE
@@ -589,11 +589,7 @@ def test_a_facade_is_painted_at_a_steady_speed_with_gentle_ends():
 @pytest.mark.parametrize("name", ["cable_acceleration", "platform_lateral_acceleration", "platform_acceleration"])
 def test_accelerations_stay_inside_their_limits_and_one_holds_it_back(name):
     """By differences of poses and lengths alone; a platform that tilts feels gravity sideways."""
-    path = {
-        "kind": "waypoints",
-        "points": [[0, 0, 1, 0, 0, 0], [0.4, 0.2, 1.1, 0.03, -0.02, 0.1], [0.1, -0.3, 1.2, 0, 0, 0]],
-        "blend": 0.05,
-    }
+    path = {"kind": "waypoints", "points": [[0, 0, 1, 0, 0, 0], [0.4, 0.2, 1.1, 0.03, -0.02, 0.1]], "blend": 0.05}
     robot, most = load("cogiro"), 0.8
     timing = time_along(robot, {"path": path, "limits": {name: most}})
     assert timing.feasible
