@@ -194,7 +194,7 @@ def test_parts_with_and_without_poses_count_as_in_the_whole_log(monkeypatch, gro
     log = Measurements(readings, known, sigma=sigma, tensions=None if "scales" in groups else tensions)
     prior = {"anchors": 0.02, "offsets": 0.05} | ({"scales": 0.05} if "scales" in groups else {})
     whole = calibrate(robot, log, free=groups, prior=prior)
-    monkeypatch.setattr(model_module, "PART", 17)
+    monkeypatch.setattr(model_module, "PART", 50)
     parts = calibrate(robot, log, free=groups, prior=prior)
     for name in ("value", "sigma"):
         one, other = ([getattr(parameter, name) for parameter in result.parameters] for result in (parts, whole))

@@ -167,15 +167,18 @@ def test_errors_of_attachments_displace_anchors_that_forces_show():
 
 def hung(lengths):
     """The pose in which cables of some lengths (4,) hold the platform, taut or slack: that of the lowest CoM."""
-    start = np.array([0, 0, 0.5, 0, 0, 0])
+    start, steps = np.array([0, 0, 0.5, 0, 0, 0]), 1e-7 * np.eye(7)[:, 1:]
 
-    def room(pose):
-        return lengths - lines(pose)[2]
+    def slack_and_height(pose):  # and their derivatives by the pose, (4, 6) and (6,)
+        poses = pose + steps
+        turned = Rotation.from_euler("xyz", poses[:, 3:]).as_matrix()
+        ends = poses[:, None, :3] + ATTACHMENTS @ turned.swapaxes(1, 2)
+        room, height = lengths - np.linalg.norm(ANCHORS - ends, axis=2), poses[:, 2] + (turned @ COM)[:, 2]
+        return room[0], (room[1:] - room[0]).T / 1e-7, height[0], (height[1:] - height[0]) / 1e-7
 
-    def height(pose):
-        return pose[2] + (Rotation.from_euler("xyz", pose[3:]).as_matrix() @ COM)[2]
-
-    found = minimize(height, start, method="SLSQP", constraints={"type": "ineq", "fun": room}, options={"ftol": 1e-10})
+    taut = {"type": "ineq", "fun": lambda at: slack_and_height(at)[0], "jac": lambda at: slack_and_height(at)[1]}
+    height = {"fun": lambda at: slack_and_height(at)[2:], "jac": True}
+    found = minimize(x0=start, method="SLSQP", constraints=taut, options={"ftol": 1e-10}, **height)
     assert found.success
     return found.x
 

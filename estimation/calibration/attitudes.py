@@ -85,29 +85,29 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
     ranked = sorted(tried, key=lambda one: one[0])
     likely = [one for one in ranked if any(one is other for other in (*ranked[:MOST_LIKELY], *of_frames))]
     try:
-        as_given = _fitted(robot, given)[0]
+        as_given, turns_given = _fitted(robot, given)
     except InputError:  # too few samples for a fit
-        as_given, likely = np.inf, ranked[:1]
-    fitted: list[tuple[float, float, str, Rotation, Rotation, str]] = []
+        as_given, turns_given, likely = np.inf, {}, ranked[:1]
+    fitted: list[tuple[float, float, str, Rotation, Rotation, str, dict[str, np.ndarray]]] = []
     for _, size, frame, left, right, k in (one for one in likely if one is not as_they_are):
         turn = ways[k].turned
         every = rotation if turn is None else turn(rotation, np.nan_to_num(given.poses[:, 3:]))
         whole = left * Rotation.from_matrix(every) * right
-        cost = _fitted(robot, _turned(given, whole))[0] if as_given < np.inf else size
+        cost, turns = _fitted(robot, _turned(given, whole)) if as_given < np.inf else (size, {})
         if as_given < np.inf and frame == "sensor" and k == 0:  # slightly askew: poses without offsets may hide that
-            askew = _rest(robot, given, whole * right.inv(), frame, up)
-            less = _fitted(robot, _turned(given, whole * right.inv() * askew))[0]
+            askew = _rest(robot, given, whole * right.inv(), turns_given, frame, up)
+            less, others = _fitted(robot, _turned(given, whole * right.inv() * askew))
             if less < cost:
-                cost, whole, left, right = less, whole * right.inv() * askew, none, askew
+                cost, turns, whole, left, right = less, others, whole * right.inv() * askew, none, askew
                 size = float(np.median((whole[rows] * expected.inv()).magnitude()))
-        fitted.append((cost, size, frame, left * right, whole, ways[k].text))
+        fitted.append((cost, size, frame, left * right, whole, ways[k].text, turns))
     if not fitted:
         return None
     simple = SIMPLER * min(one[0] for one in fitted)
-    cost, size, frame, turned, whole, text = next(one for one in fitted if one[0] <= simple)
+    cost, size, frame, turned, whole, text, turns = next(one for one in fitted if one[0] <= simple)
     rest = 0.0  # median turn that nothing explains [rad]
     if as_given < np.inf and frame:
-        more = _rest(robot, given, whole, frame, up)
+        more = _rest(robot, given, whole, turns, frame, up)
         turned, whole = ((more * one if frame == "world" else one * more) for one in (turned, whole))
         cost, turns = _fitted(robot, _turned(given, whole))
         rest = float(np.median(np.linalg.norm(turns["world"], axis=1)))
@@ -155,13 +155,19 @@ def _fitted(robot: Robot, given: Measurements) -> tuple[float, dict[str, np.ndar
     return cost, {"world": turns, "sensor": seen.inv().apply(turns)}
 
 
-def _rest(robot: Robot, given: Measurements, rotation: Rotation, frame: str, up: np.ndarray) -> Rotation:
-    """Return the turn of the world about the vertical, or of the sensor, after which the mean turn is 0, or none."""
+def _rest(
+    robot: Robot, given: Measurements, rotation: Rotation, turns: dict[str, np.ndarray], frame: str, up: np.ndarray
+) -> Rotation:
+    """Return the turn of the world about the vertical, or of the sensor, after which the mean turn is 0, or none.
 
-    def mean(by: Rotation) -> np.ndarray:
-        turns = _fitted(robot, _turned(given, by * rotation if frame == "world" else rotation * by))[1][frame]
-        return turns.mean(axis=0) @ np.outer(up, up) if frame == "world" else turns.mean(axis=0)
+    - `turns`: of `_fitted` with the orientations `rotation`.
+    """
 
-    first = mean(Rotation.identity())
-    again = float(mean(Rotation.from_rotvec(first)) @ first / max(first @ first, 1e-300))  # nearly linear in the turn
+    def mean(turns: dict[str, np.ndarray]) -> np.ndarray:
+        return turns[frame].mean(axis=0) @ (np.outer(up, up) if frame == "world" else np.eye(3))
+
+    first = mean(turns)
+    by = Rotation.from_rotvec(first)
+    changed = _fitted(robot, _turned(given, by * rotation if frame == "world" else rotation * by))[1]
+    again = float(mean(changed) @ first / max(first @ first, 1e-300))  # nearly linear in the turn
     return Rotation.from_rotvec(first / (1 - again) if abs(again) < 1 else np.zeros(3))
