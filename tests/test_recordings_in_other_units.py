@@ -121,16 +121,28 @@ def test_signs_and_units_become_encoders(tmp_path):
     np.testing.assert_allclose([one.encoder.scale for one in found.robot.cables], [1e-3, -1e-3, 1e-3, 1e-3])
 
 
-def test_a_fit_that_moves_anchors_by_metres_is_refused(tmp_path):
+def test_a_fit_that_moves_an_anchor_by_decimetres_is_refused(tmp_path):
+    """Readings of locked winches do not change, so hardly anything tells an anchor from an offset."""
     user.locked(tmp_path)
-    robot = user.hanging_robot(tmp_path)
-    text = (tmp_path / "locked.csv").read_text().splitlines()
-    rows = [line.split(",") for line in text]
-    rows = [[row[0], *(str(float(v) / 0.05) for v in row[1:5]), *row[5:]] for row in rows[1:]]
-    (tmp_path / "locked.csv").write_text("\n".join([text[0], *(",".join(row) for row in rows)]))
+    robot = load(user.hanging_robot(tmp_path))
+    first, *others = robot.cables
+    first = first.model_copy(update={"anchor": tuple(np.add(first.anchor, [0, 0.3, 0]))})
+    robot = robot.model_copy(update={"cables": (first, *others)}).save(tmp_path / "wrong.yaml")
     done = towline("calibrate", robot, "locked.csv", "--free", "anchors,offsets", cwd=tmp_path, code=1)
-    assert "not written" in done.stderr
+    assert "not written: the log does not determine cables[0].anchor.y" in done.stderr
     assert "Parameters" not in done.stdout
+
+
+def test_constant_readings_in_any_unit_are_offsets(tmp_path):
+    """Angles of drums that do not turn: slack cables, which inertia shows, are left out, and anchors remain."""
+    user.locked(tmp_path)
+    header, *rows = [line.split(",") for line in (tmp_path / "locked.csv").read_text().splitlines()]
+    rows = [[row[0], *(str(float(v) / 0.05) for v in row[1:5]), *row[5:]] for row in rows]
+    (tmp_path / "locked.csv").write_text("\n".join(",".join(row) for row in [header, *rows]))
+    log = read_measurements(tmp_path / "locked.csv")
+    found = calibrate(user.hanging_robot(tmp_path), log, free=("anchors", "offsets"))
+    assert found.refused is None
+    assert np.abs(found.robot.anchors - user.FRAME).max() < 0.01
 
 
 def flight(folder, ned, load=True):
