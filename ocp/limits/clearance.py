@@ -23,8 +23,7 @@ _NO_LENGTH = 1e-20  # [m^2], of a cable without length
 _PARALLEL = 1e-12  # squared sine of the angle of two lines below which any point of them is as near as the others
 _ROUNDING = 1e-12  # of the size of a body
 _FINE = 2.0**-40  # of a segment
-_TURNS = 9  # to the place where a cable is deepest: in random bodies of up to 200 faces 7 are enough
-_BISECTION = 4  # the turn that halves the interval instead, for bodies in which they are slow
+_CUTS = 6  # each a cutting plane and a bisection: of the place where a cable is deepest
 _TINY = 1e-12  # [m^2], keeps the root's derivative finite where things touch
 _SHORT = 1e-18  # [m^2], of a segment that is a point
 
@@ -129,8 +128,9 @@ def _outside_mesh(place: ConvexMesh, ends: int) -> ca.Function:
 
 def _chosen(rows: np.ndarray, where: Any) -> Any:
     """Return the first row (k, 1) of an array (n, k) where a condition (n, 1) holds."""
-    numbers = where * ca.DM(np.arange(-len(rows), 0))
-    return ca.mtimes(ca.DM(rows.T), numbers == ca.mmin(numbers))
+    numbers = ca.DM(np.arange(len(rows)))
+    first = ca.mmin(ca.if_else(where, numbers, len(rows)))
+    return ca.mtimes(ca.DM(rows.T), numbers == first)
 
 
 def _planes(body: Polyhedron) -> np.ndarray:
@@ -174,43 +174,40 @@ def _cable_outside(body: Polyhedron, p: Any, p_end: Any) -> Any:
 
 
 def _deepest(body: Polyhedron, p: Any, p_end: Any) -> Any:
-    """Return the least over a segment of its largest height above a face [m]; infinite where it misses the body.
+    """Return the least over a segment of its largest height above a face [m]; not positive where it meets the body.
 
-    That height is convex and piecewise linear along the segment: cutting planes and a bisection enclose the place
-    where it is least, between a face from which it falls and one from which it rises. They begin where the segment
-    enters and leaves the body.
+    That height is convex and piecewise linear along the segment: cutting planes and bisections in turn enclose the
+    place where it is least, between a face from which it falls and one from which it rises.
     """
     at, along = _heights(body, p), ca.mtimes(ca.DM(body.normals), p_end - p)
 
-    def highest(share: Any) -> tuple[_Line, Any]:
-        """Return a line that is nowhere above the heights and meets the highest at a place, and which are as high."""
+    def highest(share: Any, falling: bool) -> tuple[_Line, Any]:
+        """Return the line that is highest at a place, of equal ones the one that falls or rises most, and which."""
         values = at + share * along
         value = ca.mmax(values)
-        where = values == value
-        slope = ca.sum1(where * along) / ca.sum1(where)
-        return _Line(value - share * slope, slope), where
+        if falling:
+            slope = ca.mmin(ca.if_else(values == value, along, np.inf))
+        else:
+            slope = ca.mmax(ca.if_else(values == value, along, -np.inf))
+        return _Line(value - share * slope, slope), ca.logic_and(values == value, along == slope)
 
-    crossings = -at / ca.if_else(along == 0, 1.0, along)
-    low = within_segment(ca.mmax((along < 0) * crossings))
-    high = 1 - within_segment(ca.mmax((along > 0) * (1 - crossings)))
-    misses = low > high
-    left, right = highest(low)[0], highest(high)[0]
-    for turn in range(_TURNS):
-        share = (low + high) / 2 if turn == _BISECTION else _crossing(low, high, left, right)
-        here, _ = highest(share)
+    low, high = ca.SX(0.0), ca.SX(1.0)
+    left, right = highest(low, True)[0], highest(high, False)[0]
+    for turn in range(2 * _CUTS):
+        share = (low + high) / 2 if turn % 2 else _crossing(low, high, left, right)
+        here, _ = highest(share, True)
         falls = here.slope < 0
         low, high = ca.if_else(falls, share, low), ca.if_else(falls, high, share)
         left = _Line(*(ca.if_else(falls, new, old) for new, old in zip(here, left, strict=True)))
         right = _Line(*(ca.if_else(falls, old, new) for new, old in zip(here, right, strict=True)))
     lines = []
-    for share, sign in ((low, 1.0), (high, -1.0)):  # of faces as high as each other that which falls or rises most
-        slopes = ca.if_else(highest(share)[1], sign * along, np.inf)
-        plane = _chosen(_planes(body), slopes == ca.mmin(slopes))
+    for share, falling in ((low, True), (high, False)):
+        plane = _chosen(_planes(body), highest(share, falling)[1])
         lines.append(_Line(ca.dot(plane[:3], p) - plane[3], ca.dot(plane[:3], p_end - p)))
     # All points of a segment along a face are as deep within a span: a rounded number has no derivative.
     left, right = lines
     share = _crossing(0.0, 1.0, left, right, ca.floor(high / _FINE) * _FINE)
-    return ca.if_else(misses, np.inf, ca.fmax(*(line.start + share * line.slope for line in lines)))
+    return ca.fmax(*(line.start + share * line.slope for line in lines))
 
 
 def _crossing(low: Any, high: Any, left: _Line, right: _Line, flat: Any = None) -> Any:
@@ -238,11 +235,12 @@ def _squared(p: Any, p_end: Any, starts: Any, edges: Any) -> Any:
     between = ca.repmat(p.T, starts.shape[0], 1) - starts
     a, e = ca.fmax(ca.sumsqr(along), _NO_LENGTH), ca.sum2(edges**2)
     b, c, f = ca.mtimes(edges, along), ca.mtimes(between, along), ca.sum2(edges * between)
-    beside, least = a * e - b * b, _PARALLEL * a * e
-    s = (beside > least) * within_segment((b * f - c * e) / ca.fmax(beside, least))
-    t = within_segment((b * s + f) / e)
-    s = within_segment((b * t - c) / a)
-    gap = between + ca.mtimes(s, along.T) - ca.repmat(t, 1, 3) * edges
+    beside = a * e - b * b
+    cross = beside > _PARALLEL * a * e
+    s = ca.if_else(cross, within_segment((b * f - c * e) / ca.if_else(cross, beside, 1.0)), 0.0)
+    t = (b * s + f) / e
+    s = ca.if_else(t < 0, within_segment(-c / a), ca.if_else(t > 1, within_segment((b - c) / a), s))
+    gap = between + ca.mtimes(s, along.T) - ca.repmat(within_segment(t), 1, 3) * edges
     return ca.sum2(gap**2)
 
 
