@@ -318,6 +318,8 @@ def replay(
     if most.named and not windows.recorded.doubt:
         most, again = fitted_again(windows, most, match.parameters)
         explained = _by_kind(again)
+        left, whole = (_squares(parts, matching) for parts in (explained, _by_kind(matching)))
+        most = most._replace(explained=max(most.explained, 1 - left / whole))
     fitted, validation = _fitted(matching, most) if fits else (None, None)
     return Replay(matching, (most, *(one for one, _ in others)), explained, fitted, validation, largest)
 
@@ -348,6 +350,12 @@ def _by_kind(matching: Matching) -> dict[str, np.ndarray]:
     windows, whole = matching.windows, matching.first.drift.reshape(*matching.windows.rows.shape, -1)
     parts = zip(windows.noise.items(), np.split(whole, np.cumsum(windows.widths)[:-1], axis=-1), strict=True)
     return {name: np.where(part == 0, np.nan, part * noise) for (name, noise), part in parts}
+
+
+def _squares(parts: Mapping[str, np.ndarray], matching: Matching) -> float:
+    """Return the sum of squares of residuals by kind over their noise, without outlying windows."""
+    noise = matching.windows.noise
+    return sum(float(np.nansum((part[matching.kept] / noise[name]) ** 2)) for name, part in parts.items())
 
 
 def _of(kind: str, value: float) -> str:
