@@ -174,6 +174,21 @@ def test_the_clock_of_poses_is_aligned_again(name):
     assert after < 5e-4 < 8e-4 < before
 
 
+def test_poses_that_are_aligned_again_keep_their_noise():
+    """They are interpolated, not smoothed once more: with less noise in poses, forces would seem to stretch less."""
+    robot, draw, times = load("cogiro"), np.random.default_rng(2), np.arange(0, 40, 0.04)
+    rates, phases = draw.uniform(1, 3, 6), draw.uniform(0, 6, 6)
+
+    def motion(t):
+        return robot.home + 0.1 * np.sin(rates * t[:, None] + phases)
+
+    noise = draw.normal(0, 1e-3, (len(times), 6))
+    measured = Measurements(Dynamics(robot).cable_lengths(motion(times)), motion(times + 0.04) + noise, times=times)
+    found, _ = realigned(robot, measured)  # by one sample, so each pose is that of the sample before
+    left = found.poses - motion(found.times)
+    assert np.std(left) == pytest.approx(1e-3, rel=0.05)
+
+
 @pytest.mark.parametrize("order", ["YXZ", "ZXY", "yzx"])
 def test_angles_in_the_order_of_their_axes(order):
     """As many programs write them: the first column is the first angle, about whichever axis."""

@@ -27,6 +27,7 @@ LONGEST = 1e4  # [s] before and after the middle of a log
 MOST_TRIED, LONGEST_STEP = 8000, 0.2  # offsets, and [s] of a search in a long log
 # Another clock is better if the spread of lengths falls below this fraction; second: if orientations are not recorded.
 CLEARLY, VERY_CLEARLY = 0.8, 0.5
+EXACT = 3  # samples of a parabola that meets them: poses were smoothed when they were read
 SURELY, LIKE = 10.0, 0.8  # standard deviations of such an offset, and the correlation of speeds
 
 
@@ -125,7 +126,7 @@ def realigned(
     except InputError:
         return measurements, None
     position, rotation, _ = measured_poses(robot, measurements)
-    track = PoseTrack((times - clock.offset) / clock.rate, position, rotation, known).at_times(times[rows])
+    track = PoseTrack((times - clock.offset) / clock.rate, position, rotation, known, EXACT).at_times(times[rows])
     position, rotation = track.at(0.0)[:2]
     angles = points.angles(rotation)
     if np.nanmax(np.abs(poses[:, 3:]), initial=0.0) > np.pi:  # such as degrees, which are read as they were logged
