@@ -483,7 +483,7 @@ def test_the_delay_of_a_fast_motion_is_that_of_starts_that_suit_it(ends, late, w
     attachments = np.array([[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]]) * [ends[0], 0, ends[1]]
     body = {"mass": 6.0, "inertia": [0.24, 0.24, 0.24, 0, 0, 0], "home": [1.1, 0, 0.81, 0, 0, 0]}
     robot = framed(zip(anchors, attachments, strict=True), {**body, "dof": ["x", "z", "pitch"]})
-    draw, times = np.random.default_rng(0), 0.02 * np.arange(1000)
+    draw, times = np.random.default_rng(0), 0.02 * np.arange(600)
 
     def poses(times):
         waves = np.sin(times[:, None] * [1.4, 0, 1.7, 0, 0.9, 0] + [3, 0, 0, 0, 4, 0])
