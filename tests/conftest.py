@@ -45,7 +45,7 @@ def pytest_collection_finish():
 def stable_at_home():
     """Leave out the simulation at home in which `Predictive` looks for growing errors, a second for each new setting.
 
-    That simulation and its answer are tested in test_control_stability.py.
+    The tests in test_control_stability.py do not leave it out.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("towline.control.predictive.grows", lambda *_: False)

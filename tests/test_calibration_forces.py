@@ -94,22 +94,26 @@ def drawn(com=COM):
 
 def test_four_cables_calibrate_without_a_camera():
     """Lengths up to offsets, an inertial sensor and tensions: poses to 10 mm, and a CoM 30 mm off to 3 mm."""
-    wrong_com = COM + 0.03 * np.array([0.6, -0.64, 0.48])
+    ratios, errors, wrong_com = [], [], COM + 0.03 * np.array([0.6, -0.64, 0.48])
     names = [f"cables[{i}].{end}.{axis}" for i in range(4) for end in ("anchor", "attachment") for axis in "xyz"]
     exact = {"parameters": names, "covariance": (1e-12 * np.eye(24)).tolist()}  # as the ends of its cables are
     file = Robot.model_validate(drawn(wrong_com).model_dump() | {"uncertainty": exact})
-    poses, readings, angles, tensions, offsets = rests(0)
-    sigma = {"lengths": 1e-3, "rotation": AHRS, "tensions": 0.02}
-    result = calibrate(file, Measurements(readings, orientations=angles, tensions=tensions, sigma=sigma))
-    assert result.free == ("offsets", "com")
-    assert result.converged
-    assert not result.not_identifiable
-    assert np.sqrt(((result.poses - poses)[:, :3] ** 2).sum(axis=1).mean()) < 0.01
-    found = np.array([one.value for one in result.parameters])
-    assert np.abs(found[4:] - COM).max() < 0.003
-    np.testing.assert_array_equal(result.robot.platform.com, found[4:])
-    error = found - np.concatenate([offsets, COM])
-    assert chi2.ppf(1e-3, 7) < error @ np.linalg.solve(result.covariance, error) < chi2.ppf(1 - 1e-3, 7)
+    for seed in range(2):
+        poses, readings, angles, tensions, offsets = rests(seed)
+        sigma = {"lengths": 1e-3, "rotation": AHRS, "tensions": 0.02}
+        log = Measurements(readings, orientations=angles, tensions=tensions, sigma=sigma)
+        result = calibrate(file, log)
+        assert result.free == ("offsets", "com")
+        assert result.converged
+        assert not result.not_identifiable
+        assert np.sqrt(((result.poses - poses)[:, :3] ** 2).sum(axis=1).mean()) < 0.01
+        found = np.array([one.value for one in result.parameters])
+        errors.append(np.abs(found[4:] - COM).max())
+        np.testing.assert_array_equal(result.robot.platform.com, found[4:])
+        error = found - np.concatenate([offsets, COM])
+        ratios.append(error @ np.linalg.solve(result.covariance, error))
+    assert np.median(errors) < 0.003
+    assert chi2.ppf(1e-3, 14) < sum(ratios) < chi2.ppf(1 - 1e-3, 14)
 
 
 def test_a_sensor_mounted_askew_is_no_wrong_com():
@@ -132,24 +136,26 @@ def test_a_sensor_mounted_askew_is_no_wrong_com():
 
 def test_residuals_show_how_wrong_the_anchors_of_a_file_are():
     """Of anchors 30 mm off, six times as far as files usually are, offsets and CoM are as far off as stated."""
-    _, readings, angles, tensions, offsets = rests(0)
-    anchors = ANCHORS + np.random.default_rng(0).normal(0, 0.03, (4, 3))
-    file = robot_file(anchors, ATTACHMENTS, COM, MASS, [0, 0, 1.4, 0, 0, 0])
-    sigma = {"lengths": 1e-3, "rotation": AHRS, "tensions": 0.02}
-    result = calibrate(file, Measurements(readings, orientations=angles, tensions=tensions, sigma=sigma))
-    at = [f"cables[{i}].offset" for i in range(4)] + [f"com.{axis}" for axis in "xyz"]
-    names = [one.name for one in result.parameters]
-    own = [names.index(name) for name in at]
-    error = np.array([result.parameters[k].value for k in own]) - [*offsets, *COM]
-    square = error @ np.linalg.solve(result.covariance[np.ix_(own, own)], error)
-    assert chi2.ppf(1e-3, 7) < square < chi2.ppf(1 - 1e-3, 7)
-    assert "(as residuals show)" in result.report()
+    ratios = []
+    for seed in range(2):
+        _, readings, angles, tensions, offsets = rests(seed)
+        anchors = ANCHORS + np.random.default_rng(seed).normal(0, 0.03, (4, 3))
+        file = robot_file(anchors, ATTACHMENTS, COM, MASS, [0, 0, 1.4, 0, 0, 0])
+        sigma = {"lengths": 1e-3, "rotation": AHRS, "tensions": 0.02}
+        result = calibrate(file, Measurements(readings, orientations=angles, tensions=tensions, sigma=sigma))
+        at = [f"cables[{i}].offset" for i in range(4)] + [f"com.{axis}" for axis in "xyz"]
+        names = [one.name for one in result.parameters]
+        own = [names.index(name) for name in at]
+        error = np.array([result.parameters[k].value for k in own]) - [*offsets, *COM]
+        ratios.append(error @ np.linalg.solve(result.covariance[np.ix_(own, own)], error))
+        assert "(as residuals show)" in result.report()
+    assert chi2.ppf(1e-3, 14) < sum(ratios) < chi2.ppf(1 - 1e-3, 14)
 
 
 def test_errors_of_attachments_displace_anchors_that_forces_show():
     """Attachments 4 mm off, as in usual files: without them anchors, offsets and CoM were off by eight sigmas."""
     squares = []
-    for seed in range(2):
+    for seed in range(3):
         _, readings, angles, tensions, offsets = rests(seed)
         draw = np.random.default_rng(7 + seed)
         file = robot_file(ANCHORS, ATTACHMENTS + draw.normal(0, 4e-3, (4, 3)), COM, MASS, [0, 0, 1.4, 0, 0, 0])
@@ -162,7 +168,7 @@ def test_errors_of_attachments_displace_anchors_that_forces_show():
         known = values > 1e-10 * values[-1]  # not the position of all, for example
         assert known.sum() == 16
         squares.append((error @ vectors[:, known]) ** 2 @ (1 / values[known]))
-    assert chi2.ppf(1e-3, 32) < sum(squares) < chi2.ppf(1 - 1e-3, 32)
+    assert chi2.ppf(1e-3, 48) < sum(squares) < chi2.ppf(1 - 1e-3, 48)
 
 
 def hung(lengths):
@@ -237,13 +243,13 @@ def test_errors_of_fixed_attachments_are_part_of_what_is_weighed(by_file):
     names = [f"cables[{i}].{end}.{axis}" for i in range(4) for end in ("anchor", "attachment") for axis in "xyz"]
     stated = {"parameters": names, "covariance": np.diag(np.tile([1e-12] * 3 + [size**2] * 3, 4)).tolist()}
     log = Measurements(readings, poses=poses, tensions=tensions, sigma={"lengths": 1e-3, "tensions": 0.02})
-    for _ in range(3):
+    for _ in range(5):
         robot = robot_file(ANCHORS, ATTACHMENTS + draw.normal(0, size, (4, 3)), COM, MASS, [0, 0, 1.4, 0, 0, 0])
         robot = Robot.model_validate(robot.model_dump() | {"uncertainty": stated}) if by_file else robot
         found = calibrate(robot, log, ("anchors", "offsets", "mass", "com"), prior={"anchors": 1e-6})
         error = np.array([one.value for one in found.parameters[-4:]]) - [MASS, *COM]
         errors.append(error @ np.linalg.solve(found.covariance[-4:, -4:], error))
-    assert chi2.ppf(1e-3, 12) < sum(errors) < chi2.ppf(1 - 1e-3, 12)
+    assert chi2.ppf(1e-3, 20) < sum(errors) < chi2.ppf(1 - 1e-3, 20)
 
 
 def test_without_tensions_gravity_still_adds_two_equations():

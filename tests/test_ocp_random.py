@@ -30,6 +30,13 @@ def test_the_direct_motion_through_a_narrow_hole_is_where_the_program_starts():
     assert attempt("window", 8108).result == MotionStatus.FEASIBLE
 
 
+def test_a_coarse_motion_that_jumps_through_a_post_is_not_where_the_program_starts():
+    """From it the program ended on 480 steps after 100 s; from the motion with linear distances 120 are enough."""
+    found = plan(*random_task("bodies", 70000))
+    assert found.feasible
+    assert not any("240 steps" in stage.name for stage in found.stages)
+
+
 def test_a_cycle_passes_its_first_point_also_about_its_fastest_law():
     """With another reference than the waypoints the start was not fixed: it missed the first point by 1 mm."""
     assert attempt("cycles", 8112).result == MotionStatus.FEASIBLE
