@@ -34,14 +34,14 @@ lint: .venv/dev.stamp
 types: .venv/dev.stamp
 	$(BIN)/pyrefly check --python-interpreter-path $(BIN)/python
 
-# Four workers for two processors, because many tests wait for a browser, a command or a cluster. Each starts with a quarter
+# Three workers for two processors, because many tests wait for a browser, a command or a cluster. Each starts with a third
 # of the tests in order, so that what a file's tests share is computed once. Linear algebra has one thread: workers with two
 # each would wait for one another. glibc keeps memory that is free, because returning it and taking it again is a
 # twentieth of the time. No test reads logs, and the plugin of Zarr, which a dependency installs, is not needed: both would
 # cost each process and each of the thousands of tests some time.
 unit: .venv/dev.stamp
 	OMP_NUM_THREADS=1 MALLOC_MMAP_THRESHOLD_=33554432 MALLOC_TRIM_THRESHOLD_=268435456 \
-	  $(BIN)/python -m pytest -n 4 --dist worksteal -p no:logging -p no:zarr
+	  $(BIN)/python -m pytest -n 3 --dist worksteal -p no:logging -p no:zarr
 
 # The documentation site, in site/; a warning is an error, as long as no --quiet keeps it from being counted.
 docs: .venv/dev.stamp
