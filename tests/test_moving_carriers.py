@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from towline import InputError, load
 from towline.estimation.calibration import Measurements, calibrate, corrected
-from towline.estimation.calibration.carrier_clocks import _Recorded
+from towline.estimation.calibration.carrier_clocks import CarrierClocks
 from towline.estimation.calibration.enough import usual
 from towline.estimation.calibration.plausibility import mistake
 from towline.estimation.logs import read_log, read_measurements
@@ -135,7 +135,7 @@ def test_directions_of_some_cables_move_with_their_carriers_clocks(recording):
     seen = np.stack([CubicSpline(t, true[:, i])(t - by) for i, by in enumerate(late)], axis=1)
     for directions in (true, seen):
         directions[200:240, 0], directions[:, 1, 2], directions[:, 2] = np.nan, np.nan, np.nan
-    there = _Recorded(load(NAME), log.changed(directions=seen)).at(late).directions
+    there = CarrierClocks(load(NAME), log.changed(directions=seen)).at(late).directions
     expected = log.changed(directions=true).directions
     np.testing.assert_array_equal(np.isnan(there), np.isnan(expected))
     inner = np.r_[20:190, 250:580]  # without ends and gaps, across which curves bend

@@ -11,6 +11,7 @@ from ...figures.report import Part, Report, Section, Table
 from ...models.parsing import to_yaml
 from .balance import hangs
 from .clock import is_still
+from .clock_rate import CLEAR
 from .considered import usual_error
 from .file_errors import ENDS
 from .geometry import length_of
@@ -206,9 +207,12 @@ def _of_parameters(result: CalibrationData) -> list[Part]:
     lines: list[Part] = []
     length = length_of(result.file)  # on which a scale acts
     by_size = sorted(result.parameters, key=lambda one: -abs(one.correction) * (length if one.unit == "1" else 1))
-    always = [one.name for one in (*result.parameters, *result.carrier_clocks) if "[" not in one.name]  # of the robot
+    rate = result.clock_rate
+    clear = rate is not None and abs(rate.value) > CLEAR * rate.sigma
+    clocks = (*([rate] if rate and clear else []), *result.carrier_clocks)
+    always = [one.name for one in (*result.parameters, *clocks) if "[" not in one.name]  # of the robot
     shown = {one.name for one in by_size[:MOST_LISTED]} | set(always)
-    rows = [_one(one) for one in (*result.parameters, *result.carrier_clocks) if one.name in shown]
+    rows = [_one(one) for one in (*result.parameters, *clocks) if one.name in shown]
     columns = ("parameter", "value", "standard deviation", "change from the file")
     lines.append(Table("Parameters", columns, rows, (1, 2, 3)))
     if more := sum(one.name not in shown for one in result.parameters):

@@ -26,7 +26,7 @@ from .outliers import Outlier, Slip
 from .parameters import IN_BALANCE, Parameter, Parameters
 from .plausibility import Mistake
 from .repeating_errors import Repeating
-from .solving import Noise, Solved, covariance_of, inflation_of, lengths_of
+from .solving import Noise, Solved, covariance_of, lengths_of
 
 EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
 FAR = 5.0  # standard deviations of the prior
@@ -345,14 +345,12 @@ class CalibrationData(Displayed):
     @property
     def carrier_clocks(self) -> tuple[Parameter, ...]:
         """Return by how much the clock of each carrier is ahead of the poses' clock [s], if that was estimated."""
-        clocks = self._solved.clocks
-        if clocks is None:
-            return ()
-        sigmas = np.sqrt(np.diag(clocks.covariance) * inflation_of(self._noise))
-        return tuple(
-            Parameter(f"{self.file.carriers[i].name}.clock", float(ahead), float(sigma), float(ahead), "s")
-            for i, ahead, sigma in zip(clocks.carriers, clocks.ahead, sigmas, strict=True)
-        )
+        return tuple(one for one in self._solved.clock_errors if one.unit == "s")
+
+    @property
+    def clock_rate(self) -> Parameter | None:
+        """Return how much faster the poses' clock runs than the measurements have it [1], if that was estimated."""
+        return next((one for one in self._solved.clock_errors if one.unit == "1"), None)
 
     @cached_property
     def held_out(self) -> HeldOut:
@@ -387,6 +385,7 @@ class CalibrationData(Displayed):
             "noise": self.noise,
             "autocorrelation": self.autocorrelation,
             "clock": self.clock if "clock" in self.free else None,
+            "clock_rate": self.clock_rate._asdict() if self.clock_rate else None,
             "carrier_clocks": [one._asdict() for one in self.carrier_clocks],
             "parameters": [
                 {**parameter._asdict(), "sigma": parameter.sigma if np.isfinite(parameter.sigma) else None}

@@ -13,11 +13,13 @@ from ..logs.measurements import Measurements, measured_poses, tracked
 from ..logs.pose_track import PoseTrack
 from .autocorrelation import information_of
 from .balance import Balance
-from .carrier_clocks import CarrierClocks, has_carrier_clocks, with_carrier_clocks
+from .carrier_clocks import CarrierClocks, has_carrier_clocks
 from .carrier_motion import CarrierMotion
 from .clock import begin_with_clock
+from .clock_rate import ClockRate
 from .considered import Considered, considered
 from .fit import Fit, fit, held
+from .fitted_clocks import Clocks, with_clocks
 from .geometry import length_of
 from .hanging import carrying, without_slack
 from .left_out import left_out
@@ -25,7 +27,7 @@ from .model import Model, State
 from .normal_equations import NormalEquations, metric
 from .observability import Observability
 from .outliers import LEAST_THRESHOLD, SHORTEST, Outlier, Slip, find_outliers, find_slips, find_unbalanced, robust
-from .parameters import OF_ROBOT, Parameters
+from .parameters import OF_ROBOT, Parameter, Parameters
 from .pose_noise import observed
 from .projection import out_of_plane
 from .repeating_errors import Repeating, repeating
@@ -63,19 +65,24 @@ class Noise(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Solved(Displayed):
-    """A fit, with outliers, slips, observability, and clocks of carriers unless these are known."""
+    """A fit, with outliers, slips, observability, and clocks that were known only roughly."""
 
     model: Model
     fit: Fit
     outliers: tuple[Outlier, ...]
     slips: tuple[Slip, ...]
     observability: Observability
-    clocks: CarrierClocks | None = None
+    clocks: Clocks | None = None
 
     @property
     def parameters(self) -> np.ndarray:
         """Return the values of all parameters but slips."""
         return self.fit.state.x[: self.model.parameters.clock + OF_ROBOT]
+
+    @property
+    def clock_errors(self) -> tuple[Parameter, ...]:
+        """Return the clocks as they were estimated."""
+        return () if self.clocks is None else self.clocks.parameters(inflation_of(self.noise))
 
     @cached_property
     def noise(self) -> Noise:
@@ -140,9 +147,12 @@ def solve(
     model, fitted = replace(model, kept=used.kept), used.weights
     model, result = _weighed(model, result, length, False)
     model, result = without_slack(model, result, length)
-    clocks: CarrierClocks | None = None
+    clocks, recorded = (begin.clocks if begin else None), None
     if has_carrier_clocks(robot, measurements):
-        model, result, clocks = with_carrier_clocks(model, result, measurements, None, length)
+        recorded = CarrierClocks(robot, measurements)
+        model, result, clocks = with_clocks(model, result, recorded, None, length, search=True)
+    elif model.track and model.carriers is None:
+        recorded = clocks.recorded if clocks else ClockRate(model)
     wrong: dict[tuple[int, int], Outlier] = {}
     slips: list[Slip] = []
     for _ in range(ROUNDS if outliers else 0):
@@ -168,8 +178,8 @@ def solve(
         result, fitted = fit(model, result.state, length), model.weights
     model, result = _weighed(model, result, length, True)
     seen = observed(model, result.state, length)
-    if clocks is not None:
-        model, result, clocks = with_carrier_clocks(model, result, measurements, clocks, length)
+    if recorded is not None:
+        model, result, clocks = with_clocks(model, result, recorded, clocks, length)
         seen = clocks.widened(observed(model, result.state, length))
     return Solved(model, result, tuple(wrong.values()), tuple(slips), seen, clocks)
 
