@@ -62,16 +62,19 @@ def _simulated(
     push -= push @ controller.uncontrolled.T @ controller.uncontrolled  # a load that spins below a cable is let alone
     push *= PUSH * robot.force_scale * scale
     steps = int(np.clip(SLOW / max(bandwidth, SLOWEST) / PERIOD, LEAST, MOST))
-    sizes, grown = np.zeros(MOST), False
+    sizes, before, grown = np.zeros(MOST), np.zeros(6), False
     for k, (now, command) in enumerate(closed_loop(controller, robot, tensions, push, age, lag)):
-        off, sizes[k] = np.linalg.norm(scale * (now.pose - robot.home)), np.linalg.norm(scale * now.velocity)
+        off, change = np.linalg.norm(scale * (now.pose - robot.home)), scale * (now.velocity - before)
+        # At the turning points of a swing, where nothing moves, accelerations are largest.
+        sizes[k] = np.linalg.norm([scale * now.velocity, change / (PERIOD * max(bandwidth, SLOWEST))])
+        before = now.velocity
         if not off < FAR * robot.length or command.answered == OTHERWISE:
             grown = True
             break
         if k + 1 >= steps:
-            before, last = np.linalg.norm(sizes[: steps // 3 * 3].reshape(3, -1)[1:], axis=1)
-            grown = last > MORE * before
-            if grown or not last > before:
+            second, last = np.linalg.norm(sizes[: steps // 3 * 3].reshape(3, -1)[1:], axis=1)
+            grown = last > MORE * second
+            if grown or not last > second:
                 break
             steps += MORE_STEPS
     controller.reset()
@@ -98,6 +101,7 @@ def closed_loop(
     still = np.zeros_like(robot.carrier_home)
     reference = Reference(robot.home, np.zeros(6), np.zeros(6), robot.carrier_home, still, still, tensions)
     state, pulls, drives, held = plant.start(tensions=tensions), tensions, Lag(lag), np.ones(robot.m, dtype=bool)
+    fixed = plant.read(state).lengths  # those of the file fit a rounded home only nearly
     late = deque([State(robot.home, np.zeros(6), robot.carrier_home, still, tensions)] * round(age / PERIOD))
     controller.reset()
     controller.follow([reference, reference], PERIOD)
@@ -109,7 +113,7 @@ def closed_loop(
         if command.released is not None:
             for cable in np.flatnonzero(held & command.released):
                 state, held[cable] = plant.cut(state, int(cable)), False
-        cables = command.tensions if robot.fixed_lengths is None else robot.fixed_lengths
+        cables = command.tensions if robot.fixed_lengths is None else fixed
         given = None if command.actuation is None else drives.follow(command.actuation, PERIOD)
         if given is not None and lost is not None:
             given[lost] = 0.0

@@ -26,6 +26,7 @@ WINDOW, PAUSE = 0.05, 0.21  # [s]: in which a motion is compared, at least, and 
 BLIND, UNCHECKED = 0.015, 0.5  # [s], at most: without a state, and without a comparison
 QUICK, LONG = 0.01, 0.1  # [s]: noise is quicker than what tensions correct, and how long it is heard
 OFTEN = 2.0  # standard deviations of noise have room: one command in twenty is cut off
+VARIES = 2.0  # times its variance is what known noise, for which bandwidths are chosen, has in some tenth of a second
 SMOOTH, MEAN = 0.005, 0.04  # [s], of the difference, against noise, and of the mean of its size
 EARLY = 1e-6  # of the window
 KNOWN = 0.5  # of an acceleration that sensors find missing in the tensions: observers follow it, predictions do not
@@ -86,7 +87,8 @@ class Watch:
       coordinates together [m/s], which is permitted as well.
     - `ripple`: tensions commanded for unit rates of the pose, relative to the distance of tensions from their limits,
       (m, 6) [s/m, s/rad]. The limits clip the effect of rate noise, more on one side than on the other, so `OFTEN`
-      standard deviations beyond the limits are a reason to hand over. Default: noise is ignored.
+      standard deviations beyond the limits are a reason to hand over, and `VARIES` times their variance if noise is
+      known. Default: noise is ignored.
     - `blind`: largest time without a state that is bridged by predictions [s]; less for cables of fixed length, whose
       tensions change as carriers turn.
     """
@@ -101,7 +103,7 @@ class Watch:
     ):
         self._scale, self._blind = scale, blind
         self._bound = BOUND * usual + noise / WINDOW
-        self._ripple = None if ripple is None else (OFTEN * ripple) ** 2
+        self._ripple = None if ripple is None else (OFTEN * ripple) ** 2 / (VARIES if noise else 1.0)
         self.reset()
 
     def reset(self) -> None:

@@ -287,6 +287,19 @@ def test_differences_of_coarse_poses_leave_room_for_tensions():
     assert calm.error.max() < 5e-3
 
 
+def test_known_noise_that_varies_as_noise_does_is_no_reason_to_hand_over():
+    """Bandwidths leave two standard deviations inside the limits; the variance in a tenth of a second varies by 10 %.
+
+    Noise of three times the known one is a reason: its commands are cut off in one of two steps.
+    """
+    robot, known = load("wang-flying"), {"position": 5e-4, "attitude": 5e-4, "velocity": 0.014, "attitude_rate": 0.014}
+    louder = known | {"velocity": 0.042, "attitude_rate": 0.042}
+    for noise, seed, is_good in ((known, 0, True), (known, 1, True), (known, 2, True), (louder, 0, False)):
+        run = simulate(robot, robot.home, Predictive(robot, sensors=known), duration=0.6, noise=noise, seed=seed)
+        assert (run.handed_over is None) == is_good
+        assert run.error.max() < 4e-3 or not is_good
+
+
 def test_the_command_line_gives_its_controllers_the_sensors(tmp_path):
     path = {"kind": "line", "start": [-1, 0, 1.5], "end": [0.5, 0, 1.5]}
     plan("cogiro", {"path": path, "duration": 2.0}).save(tmp_path / "line.nc")
