@@ -198,8 +198,8 @@ def _interpolated(nodes: np.ndarray, parts: list[np.ndarray], times: np.ndarray)
     """Return the polynomials of degree 5 between nodes that have their poses, velocities and accelerations."""
     inside = np.clip(times, nodes[0], nodes[-1])
     k = np.clip(np.searchsorted(nodes, inside, side="right") - 1, 0, len(nodes) - 2)
+    after, (k, piece) = inside - nodes[k], np.unique(k, return_inverse=True)  # most pieces have several times
     h = (nodes[k + 1] - nodes[k])[:, None, None]
-    s = (inside - nodes[k])[:, None, None] / h
     (p, q), (u, v), (a, b) = ((part[k], part[k + 1]) for part in parts)
     u, v, a, b = h * u, h * v, h * h * a, h * h * b
     # From the start of the piece on: p + u s + a s^2 / 2 + c3 s^3 + c4 s^4 + c5 s^5.
@@ -209,6 +209,8 @@ def _interpolated(nodes: np.ndarray, parts: list[np.ndarray], times: np.ndarray)
     c3 = np.where(short, off + bend / 6, 10 * gap - 4 * speed + bend / 2)
     c4 = np.where(short, -off / 2, -15 * gap + 7 * speed - bend)
     c5 = np.where(short, 0.0, 6 * gap - 3 * speed + bend / 2)
+    h, p, u, a, c3, c4, c5 = (part[piece] for part in (h, p, u, a, c3, c4, c5))
+    s = after[:, None, None] / h
     pose = p + s * (u + s * (a / 2 + s * (c3 + s * (c4 + s * c5))))
     velocity = (u + s * (a + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h
     acceleration = (a + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))) / h**2

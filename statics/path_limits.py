@@ -53,7 +53,7 @@ class PathLimits:
         floor, after = np.zeros(len(self._rows.falls)), 0.0
         if not self._goes_on or self._rows.can_rest.all():
             return floor
-        least, most = np.array([self._rows.range_of(np.full_like(floor, x)) for x in LEVELS]).swapaxes(0, 1)
+        least, most = self._rows.range_of(LEVELS[:, None, None])
         free = most - least
         needed = np.clip(free[-1], 0.0, ROOM)  # where u has no room, no step ends
         for at in range(len(floor) - 1, -1, -1):
@@ -68,7 +68,7 @@ class PathLimits:
             self._extend(1)
         k = int(place)
         # Three instants, so that where the plan's acceleration jumps, u keeps the limits after it a step before it.
-        least, most = _Bounds(*(part[k : k + 3] for part in self._rows)).range_of(np.full(3, rate * rate))
+        least, most = _Bounds(*(part[k : k + 3] for part in self._rows)).range_of(rate * rate)
         low, high = float(least.max()), float(most.min())
         if low > high:  # none is possible: of those between, the one nearest to the rate of now
             return (min(max(0.0, high), low),) * 2
@@ -79,31 +79,33 @@ class PathLimits:
 
 
 class _Bounds(NamedTuple):
-    """Bounds of u at n instants: least <= u + falls x <= most of k facets, |v u + g x| <= 1 of c carriers."""
+    """Bounds of u at n instants, with x = r^2, of k facets and c carriers.
 
-    least: np.ndarray  # (n, k), nan where a facet bounds nothing
+    least <= u + falls x <= most, and |u - middle x| <= sqrt(free - falling x^2) by |v u + g x| <= 1; infinite where
+    nothing is bounded.
+    """
+
+    least: np.ndarray  # (n, k)
     most: np.ndarray
     falls: np.ndarray
-    vv: np.ndarray  # (n, c), v . v, and so on; nan where the carrier rests
-    vg: np.ndarray
-    gg: np.ndarray
+    middle: np.ndarray  # (n, c)
+    free: np.ndarray
+    falling: np.ndarray
 
     @property
     def can_rest(self) -> np.ndarray:
         """Return at which instants the robot can rest, (n,)."""
-        least, most = self.range_of(np.zeros(len(self.falls)))
+        least, most = self.range_of(0.0)
         return (least <= 0) & (most >= 0)
 
-    def range_of(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the least and the largest u for x = r^2 of each instant, (n,)."""
-        fallen = self.falls * x[:, None]
-        least, most = np.fmax.reduce(self.least - fallen, axis=1), np.fmin.reduce(self.most - fallen, axis=1)
-        least, most = np.fmax(least, -FASTEST), np.fmin(most, FASTEST)
-        if self.vv.shape[1]:
-            middle = -self.vg * x[:, None]
-            root = np.sqrt(np.maximum(middle**2 - self.vv * (self.gg * x[:, None] ** 2 - 1.0), 0.0))
-            least = np.fmax(least, np.fmax.reduce((middle - root) / self.vv, axis=1))
-            most = np.fmin(most, np.fmin.reduce((middle + root) / self.vv, axis=1))
+    def range_of(self, x: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the least and the largest u for x = r^2, a number or (..., 1, 1), at each instant, (..., n)."""
+        fallen = self.falls * x
+        least = (self.least - fallen).max(axis=-1, initial=-FASTEST)
+        most = (self.most - fallen).min(axis=-1, initial=FASTEST)
+        if self.free.shape[1]:
+            middle, root = self.middle * x, np.sqrt(np.maximum(self.free - self.falling * (x * x), 0.0))
+            least, most = np.maximum(least, (middle - root).max(-1)), np.minimum(most, (middle + root).min(-1))
         return least, most
 
 
@@ -115,7 +117,7 @@ class Instants(NamedTuple):
     c: np.ndarray
     low: np.ndarray  # of what the cables can give
     high: np.ndarray
-    carriers: tuple[np.ndarray, np.ndarray, np.ndarray]  # vv, vg and gg of `_Bounds`
+    carriers: tuple[np.ndarray, np.ndarray, np.ndarray]  # the last three of `_Bounds`
 
     def bounds(self, reserve: float) -> _Bounds:
         """Return the bounds of u; tensions keep the share `reserve` of their range."""
@@ -125,7 +127,8 @@ class Instants(NamedTuple):
         high = self.high - np.clip((self.high - now) / 2, 0.0, inside)
         low, high = np.minimum(low, now) - self.c, np.maximum(high, now) - self.c
         least, most = np.sort([low / self.a, high / self.a], axis=0)
-        return _Bounds(least, most, self.b / self.a, *self.carriers)
+        bounds = np.nan_to_num(least, nan=-np.inf), np.nan_to_num(most, nan=np.inf), np.nan_to_num(self.b / self.a)
+        return _Bounds(*bounds, *self.carriers)
 
 
 def instants_of(robot: Robot, trajectory: Trajectory, first: float) -> Instants:
@@ -149,4 +152,7 @@ def instants_of(robot: Robot, trajectory: Trajectory, first: float) -> Instants:
     if has_winches(robot):
         v, g = shares_of_winches(robot, trajectory, first + WINDOW / INSTANTS * np.arange(INSTANTS))
         vv, vg, gg = (np.hstack(pair) for pair in ((vv, v * v), (vg, v * g), (gg, g * g)))
-    return Instants(a, b, c, available.low, available.high, (np.where(vv > STILL, vv, np.nan), vg, gg))
+    moves = vv > STILL
+    vv = np.where(moves, vv, 1.0)
+    bounds = -vg / vv * moves, np.where(moves, 1.0 / vv, np.inf), (vv * gg - vg**2) / vv**2 * moves
+    return Instants(a, b, c, available.low, available.high, bounds)

@@ -416,3 +416,17 @@ def test_no_motion_is_audited_twice_for_a_stop(monkeypatch):
     assert len(laws) > 1
     for one, other in itertools.combinations(laws, 2):
         assert one.times.shape != other.times.shape or not np.array_equal(np.stack(one), np.stack(other))
+
+
+def test_towing_robots_brake_as_hard_as_their_accelerations_permit():
+    """No audit sees these limits: |a| of the carriers reaches the largest one, and by no more than rounding."""
+    robot = load("wang-ctmrts-6").model_dump(mode="json")
+    for carrier in robot["carriers"]:
+        carrier |= {"reach": {"min": [-9] * 3, "max": [9] * 3}, "acceleration_max": 0.6}
+    robot, (x, y, z) = Robot.model_validate(robot), robot["platform"]["home"][:3]
+    path = {"kind": "line", "start": [x, y, z], "end": [x + 1.5, y, z]}
+    found = plan(robot, {"path": path, "duration": 4.0, "base": {"kind": "free"}, "steps": 16})
+    assert found.feasible
+    for time in (1.6, 2.0):
+        _, _, acceleration = stop(found, time).carriers
+        assert np.linalg.norm(acceleration[..., :3], axis=-1).max() == pytest.approx(0.6, rel=2e-3)
