@@ -189,6 +189,23 @@ def test_poses_that_are_aligned_again_keep_their_noise():
     assert np.std(left) == pytest.approx(1e-3, rel=0.05)
 
 
+@pytest.mark.parametrize(
+    ("name", "mirror", "frame"), [("cogiro", "xzy", 0), ("caroca-pulleys", "yxz", 0), ("cogiro", "xyz", 1)]
+)
+def test_left_handed_axes(name, mirror, frame):
+    """As of game engines: the mirror image of a symmetric robot looks like the robot with its cables reversed."""
+    robot, poses, y = a_log(name)
+    M = np.eye(3)[["xyz".index(axis) for axis in mirror]] if mirror != "xyz" else np.diag([1, -1, 1])
+    anywhere = ([1, 2, -0.5], Rotation.from_euler("zyx", [133, 5, 3], degrees=True)) if frame else NONE
+    given = seen(np.hstack([poses[:, :3] @ M.T, points.angles(M @ points.rotations(poses[:, 3:]) @ M.T)]), anywhere)
+    found = mistake(robot, Measurements(y, given))
+    assert "left-handed" in found.text
+    apart = points.rotations(found.corrected.poses[:, 3:]) - points.rotations(poses[:, 3:])
+    assert np.abs(apart).max() < (0.15 if frame else 1e-9)
+    assert np.abs(found.corrected.poses - poses)[:, :3].max() < (0.03 * robot.length if frame else 1e-9)
+    np.testing.assert_array_equal(found.corrected.lengths, y)
+
+
 @pytest.mark.parametrize("order", ["YXZ", "ZXY", "yzx"])
 def test_angles_in_the_order_of_their_axes(order):
     """As many programs write them: the first column is the first angle, about whichever axis."""

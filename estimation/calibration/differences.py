@@ -69,6 +69,11 @@ class LogPart(NamedTuple):
                 one[:, 3:] = points.angles(way.turned(points.rotations(one[:, 3:]), one[:, 3:]))
         return way.placed(self.position), turned, carriers
 
+    def read_in(self, way: Interpretation) -> LogPart:
+        """Return the log with poses as another interpretation reads them."""
+        position, rotation, carriers = self.at(way)
+        return self._replace(position=position, rotation=rotation, carriers=carriers)
+
     def parts(self, way: Interpretation) -> tuple[np.ndarray, np.ndarray]:
         """Return the parts of lengths (m, N + c) and readings (m, m, N + c) that cables do not explain [m].
 

@@ -17,7 +17,7 @@ from ...models import points
 from ...models.robot import Robot
 from .differences import AS_GIVEN, LogPart
 from .geometry import length_of, runs
-from .interpretations import Interpretation, interpretations
+from .interpretations import LEFT_HANDED, Interpretation, interpretations
 
 FEW, MANY = 6, 60  # steps of a first and of a last descent
 KEPT = 8  # starts that are worth a last descent
@@ -132,7 +132,10 @@ def _starts(few: LogPart) -> list[Frames]:
 
 
 def in_convention(log: LogPart, frames: Frames) -> tuple[Frames, Interpretation]:
-    """Return frames with the convention of angles in which they fit a log much better, or these if there is none."""
+    """Return frames with the convention in which they fit a log much better, or these if there is none.
+
+    It is one of angles, or left-handed axes, which no turn makes right-handed.
+    """
     few, home = _few(log), points.rotations(log.robot.home[3:])
     ways = [way for way in interpretations(True) if way.turned is not None and way.placed is AS_GIVEN.placed]
     rotations = np.stack([few.at(way)[1] for way in ways])
@@ -140,8 +143,11 @@ def in_convention(log: LogPart, frames: Frames) -> tuple[Frames, Interpretation]
     starts = [Frames(frames.outer, (np.zeros(3), (frames.outer[1] @ mean).T @ home)) for mean in means]
     tried = _descended(few._replace(rotation=rotations), starts, BOTH, FEW)
     way = min(zip(tried, ways, strict=True), key=lambda one: one[0].size)[1]
-    found = fitted_frames(log._replace(rotation=log.at(way)[1]))
-    return (found, way) if MUCH_BETTER * found.size < frames.size else (frames, AS_GIVEN)
+    for one in (way, LEFT_HANDED):
+        found = fitted_frames(log.read_in(one))
+        if MUCH_BETTER * found.size < frames.size:
+            return found, one
+    return frames, AS_GIVEN
 
 
 def displaced_frames(log: LogPart, least: float, noise: float) -> tuple[Frames, float] | None:

@@ -36,6 +36,12 @@ class Interpretation(NamedTuple):
         return self.placed is Interpretation("").placed and self.turned is None
 
 
+_MIRROR = np.diag([1, -1.0, 1])
+LEFT_HANDED = Interpretation(
+    "the axes look left-handed, with y the other way", lambda x: x @ _MIRROR, lambda R, _: _MIRROR @ R @ _MIRROR
+)
+
+
 def interpretations(turns: bool) -> list[Interpretation]:
     """Return the ways to read a log, the given one first; those of orientations if the platform `turns`."""
     result = [Interpretation("")]
@@ -97,9 +103,12 @@ def _framed() -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
         yield named, turn, FROM_FRD
     up = np.array([[1, 0, 0], [0, 0, -1.0], [0, 1, 0]])  # of many motion capture systems
     for quarters in range(4):
-        turn = np.rint(Rotation.from_euler("z", 90 * quarters, degrees=True).as_matrix()) @ up
+        about = np.rint(Rotation.from_euler("z", 90 * quarters, degrees=True).as_matrix())
         along = ("x", "y", "-x", "-y")[quarters]
-        yield f"in axes of which y points up, with their x along {along} of {{G}}", turn, turn.T
+        named = f"with their x along {along} of {{G}}"
+        yield f"in axes of which y points up, {named}", about @ up, (about @ up).T
+        for height, mirror in {"z": _MIRROR, "y": np.eye(3)[[0, 2, 1]]}.items():  # as of game engines
+            yield f"in left-handed axes of which {height} points up, {named}", about @ mirror, (about @ mirror).T
 
 
 def _times(factor: float | np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

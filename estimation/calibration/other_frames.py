@@ -224,7 +224,7 @@ def _tried(log: Unexplained, order: np.ndarray) -> Iterator[_Framed]:
             yield _Framed(frames, read, way, moved)
             return
         scaled = ordered.y[:, way.columns] * way.signs * way.way.factor
-        part = ordered._replace(y=scaled, rotation=ordered.at(read)[1], counted=False)
+        part = ordered.read_in(read)._replace(y=scaled, counted=False)
         frames = fitted_frames(part, frames, FAR * log.noise)
 
 
@@ -240,8 +240,7 @@ def _placed(
     log: Unexplained, part: LogPart, frames: Frames, read: Interpretation
 ) -> tuple[Placed, LogPart, np.ndarray]:
     """Return the poses of all samples in frames, and the sound samples of a part there with their differences."""
-    moved = frames.of(log.whole.position, log.whole.at(read)[1])
-    placed = frames.of(part.position, part.at(read)[1])
+    moved, placed = (frames.of(*one.at(read)[:2]) for one in (log.whole, part))
     return (*moved, None), *part._replace(position=placed[0], rotation=placed[1]).sound()
 
 
