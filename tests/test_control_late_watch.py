@@ -103,3 +103,17 @@ def test_a_disturbance_is_found_by_every_fifth_state(name):
         first, other = (getattr(one, found) for one in every.values())
         np.testing.assert_allclose(other, first, atol=0.05 * push)
     np.testing.assert_allclose(every[5].disturbance_of_carriers[0, 0], carriers, atol=0.1)
+
+
+def test_a_cut_is_noticed_though_states_are_missing_for_a_third_of_the_window_again_and_again():
+    """8 of 30 states, 16 ms: a window of 50 ms without such a gap never came, and the platform fell over unnoticed."""
+    robot, good = load("wang-ctmrts"), load("planar-4")
+    push = [{"kind": "push", "at": 0.1, "duration": 0.2, "force": [0.03 * good.weight, 0, 0]}]
+    for its, events, cut in ((robot, ["cut 1 at 0.3"], 0.3), (good, push, None)):
+        controller = Predictive(its)
+        sparse = Sparse(controller, lambda k: k % 30 >= 8)
+        simulate(its, its.home, sparse, duration=0.5, period=2e-3, events=events)
+        if cut is None:
+            assert controller.handed_over is None
+        else:
+            assert cut < controller.handed_over.time <= cut + 0.05

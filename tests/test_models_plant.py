@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from towline import Dynamics, Robot, SolverError, load
+from towline import Dynamics, Robot, SolverError, load, tensions
 from towline.base.errors import InputError
 from towline.models.points import rotations
 from towline.plant import Plant
@@ -95,6 +95,50 @@ def test_energy_is_kept_without_damping(name):
     energies = [energy(robot, plant, state, lengths, stiffness) for state in run.states[::50]]
     moving = energies[0] - energy(robot, plant, plant.start(), lengths_at(robot), stiffness)
     assert np.ptp(energies) < 1e-9 * abs(moving)
+
+
+def test_a_stuck_winch_and_a_cut_cable_take_their_own_energy_and_no_other():
+    """The work of motors is energy: a winch that sticks loses J v^2 / 2, a cut cable t^2 L / 2EA and its winch's.
+
+    A cable that is wound up at the rate v, under the tension t, takes its strain energy t^2 / 2EA v with it.
+    """
+    J, EA, winch = 2.0, 2e4, {"inertia": 2.0, "friction": 0.0, "speed_max": 1e3, "force_max": 1e6}
+    data = load("planar-4").model_dump(mode="json")
+    for cable in data["cables"]:
+        cable |= {"stiffness": EA, "damping": 0.0, "winch": winch}
+    robot = Robot.model_validate(data)
+    rest, plant = np.asarray(tensions(robot, robot.home).tensions), Plant(robot, drive="forces")
+    held_cables, turning = np.ones(robot.m), np.ones(robot.m)
+
+    def total(state):
+        now = plant.read(state)
+        stretched = np.maximum(lengths_at(robot, now.pose) - now.lengths, 0)
+        own = 0.5 * EA * stretched**2 / now.lengths
+        return (
+            energy(robot, plant, state, now.lengths, EA)
+            - own @ (1 - held_cables)
+            + 0.5 * J * turning @ now.length_rates**2
+        )
+
+    state = plant.start(tensions=rest)
+    expected, moved = total(state), 0.0
+    for phase, pulls in enumerate(rest * (1 + 0.2 * np.sin(np.arange(3)[:, None] + np.arange(robot.m)))):
+        if phase:  # a winch sticks, then the cable of another one is cut
+            now, index = plant.read(state), 2 - phase
+            t = EA * max(lengths_at(robot, now.pose)[index] / now.lengths[index] - 1, 0.0)
+            lost = 0.5 * J * now.length_rates[index] ** 2 + (phase == 2) * t**2 / (2 * EA) * now.lengths[index]
+            assert lost > 1e-4
+            expected, turning[index] = expected - lost, 0.0
+            state = (plant.stick if phase == 1 else plant.cut)(state, index)
+            held_cables[index] = 2 - phase
+        run = plant.run(state, held(plant, 1000, pulls), 2e-4)
+        state, lengths = run.states[-1], plant.read(run.states).lengths
+        strain = run.tensions**2 / (2 * EA)
+        wound = np.diff(lengths, axis=0)
+        expected -= turning @ (wound.sum(axis=0) * pulls + ((strain[1:] + strain[:-1]) / 2 * wound).sum(axis=0))
+        moved += np.abs(wound).sum()
+        assert total(state) == pytest.approx(expected, abs=1e-6)
+    assert moved > 0.1
 
 
 def test_a_pendulum_swings_in_the_period_of_the_elliptic_integral():
