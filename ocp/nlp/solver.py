@@ -19,6 +19,7 @@ from ...base.inputs import shown
 from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
 from .guess import initial_guess
+from .near import has_places
 from .program import Program
 from .rows import MANY
 from .waiting import Errands, wait_for
@@ -30,6 +31,9 @@ PATIENCE, FROM_COARSER = 10, 5
 ROUND, CLOSE = 24, 1e-4  # iterates in a circle, and what constraints miss there at most
 GAIN = 1e-4  # of the objective: what an iterate must be better by not to be in a circle
 MOST_ITERATIONS = 400
+# Of the objective: how far it may be above the least where a run near an optimum ends at one barrier. Bounds
+# that are not active add little: it was above it by 0.07 % and less. Then the least and the largest barrier.
+ABOVE, BARRIERS = 5e-3, (1e-9, 1e-5)
 # MUMPS refactorises less with a larger pivot tolerance where thrust directions are equations: teams of
 # quadrotors then take half of the time. For other robots each iteration takes 10 % longer. Ordered by METIS, an
 # iteration of a team past obstacles takes less than half of the time that it takes with MUMPS's own choice. Without a
@@ -127,8 +131,27 @@ class Solver:
         own = "motion" if self._last is None else "near" if near else self._own
         start = own if near or guess is None else "coarser" if coarser else "motion"
         if start not in self._solvers:
-            self._solvers[start] = self._make(_STARTS[start])
+            self._solvers[start] = self._make(_STARTS[start] | self._one_barrier(start, guess))
         return self._solvers[start]
+
+    def _one_barrier(self, start: str, guess: Deviation | None) -> dict[str, Any]:
+        """Return options for a start near the optimum of a coarser mesh, or with other bounds again: one barrier.
+
+        At its solution the objective of a convex program is above the least by at most the barrier times the number of
+        bounds. Teams and tasks past regions have it, since their iterations take longest.
+        """
+        program, last = self.program, self._last
+        long = program.scenario.count > MANY or has_places(program.scenario)
+        near = start == "coarser" or (start in ("tightened", "solution") and "coarser" in self._solvers)
+        if not (long and near):
+            return {}
+        x = program.pack(guess) if guess is not None else last["x"] if last else 0.0
+        objective = ca.Function("objective", [program.problem[name] for name in "xp"], [program.problem["f"]])
+        above = ABOVE * abs(float(objective(x, program.parameters)))
+        bounds = (program.lower, program.upper), (program.lower_g, program.upper_g)
+        count = sum(np.isfinite(each[low < high]).sum() for low, high in bounds for each in (low, high))
+        barrier = float(np.clip(above / max(count, 1), *BARRIERS))
+        return {"mu_init": barrier, "mu_target": barrier, "compl_inf_tol": barrier, "tol": 1e-5}
 
     def take(self, scenario: Scenario) -> None:
         """Go on with another scenario, of which the program with parameters is one too (`Program.of`)."""

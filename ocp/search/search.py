@@ -276,9 +276,9 @@ class Search:
         elif known is None or not (again or np.isfinite(reach) or known.program.near.is_everywhere):
             self._solvers[mesh] = wait_for(lambda: self._solver(self._built(mesh, guess, reach)))
         solver = self._solvers[mesh]
-        solver.prepare(guess, coarser)
-        built = time.perf_counter()
         at = None if guess is None else guess.at(solver.program.shares * guess.nodes[-1])
+        solver.prepare(at, coarser)
+        built = time.perf_counter()
         try:
             outcome = solver.solve(at, self._iteration, coarser, self.seconds_left, stray=mesh.elastic)
         except BaseException:

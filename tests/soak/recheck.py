@@ -218,9 +218,8 @@ def _bounded(motion: SavedMotion, robot: Robot, task: Mapping[str, Any], limits:
         lengths = np.linalg.norm(np.subtract(*motion.cables(fine)), axis=-1)
         check("cable_length", lengths, span["min"], span["max"], span["max"])
     if (most := limits.get("cable_speed")) is not None and not robot.pulley_radii.any():
-        middle = (fine[1:] + fine[:-1]) / 2
         step = 1e-6
-        later, sooner = (np.linalg.norm(np.subtract(*motion.cables(middle + k)), axis=-1) for k in (step, -step))
+        later, sooner = (np.linalg.norm(np.subtract(*motion.cables(fine + k)), axis=-1) for k in (step, -step))
         check("cable_speed", np.abs(later - sooner) / (2 * step), -np.inf, most, most + 1e-3)
     free = (task.get("base") or {}).get("kind") == "free"
     carried = [*motion.carriers(fine)] if free else []
