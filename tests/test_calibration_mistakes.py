@@ -386,3 +386,22 @@ def test_cable_speeds_in_a_wrong_frame_show_no_clock():
     assert found is not None
     assert "in axes of which y points up" in found.text
     np.testing.assert_allclose(found.corrected.poses, poses, atol=1e-9)
+
+
+@pytest.mark.parametrize("heading", [0, 35])
+def test_the_order_of_cables_beside_an_ahrs(heading):
+    """Without positions, lengths at the measured orientations show it, in any heading and with any offsets."""
+    robot, poses, y = a_log("cogiro", 3, count=30)
+    turn = Rotation.from_euler("z", heading, degrees=True)
+    seen_turned = turn * Rotation.from_euler("xyz", poses[:, 3:])
+    attitudes = np.hstack([np.full((30, 3), np.nan), points.angles(seen_turned.as_matrix())])
+    columns, sigma = [3, 0, 5, 1, 7, 2, 4, 6], {"lengths": 2e-3, "rotation": 5e-3}
+    if not heading:
+        assert mistake(robot, Measurements(y, attitudes, sigma=sigma)) is None
+    found = mistake(robot, Measurements(y[:, columns], attitudes, sigma=sigma))
+    order = np.argsort(columns)
+    assert found.text.startswith(f"the cables look like columns {', '.join(f'l{j}' for j in order)} of the log")
+    assert ("the world of the orientations looks turned" in found.text) == bool(heading)
+    np.testing.assert_array_equal(found.corrected.lengths, y)
+    left = Rotation.from_euler("xyz", found.corrected.poses[:, 3:]) * Rotation.from_euler("xyz", poses[:, 3:]).inv()
+    assert np.degrees(left.magnitude()).max() < 2

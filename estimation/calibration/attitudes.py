@@ -5,8 +5,6 @@ measured one by a rotation of the sensor's world, such as that to magnetic north
 Offsets of the readings and a wrong CoM turn a small platform as much, so fits with these unknown decide.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -17,10 +15,13 @@ from ...models.robot import Robot
 from ..logs.encoders import lengths_of
 from ..logs.measurements import Measurements, measured_poses
 from ..pose.from_lengths import pose_from_lengths
+from .attitude_orders import likely_order
 from .balance import needs_balance
+from .explanations import with_order
 from .geometry import length_of
 from .hanging import without_slack
 from .interpretations import interpretations
+from .other_frames import Mistake, corrected_to
 from .solving import model_of
 from .starts import fit_from
 
@@ -36,19 +37,26 @@ ENOUGH = 1e-3  # of the sum of squares, of a step that these fits need not take
 MOST_WRONG = 9.0  # times the median of the samples' sums of squares, up to which a sample counts
 
 
-class Misread(NamedTuple):
-    """An error of the measured orientations, in one line, and the measurements without it, None if much is left."""
-
-    text: str
-    corrected: Measurements | None
-
-
-def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
-    """Return what is wrong with orientations that were measured without positions, or None."""
-    _, rotation, known = measured_poses(robot, given)
+def misread_attitudes(robot: Robot, given: Measurements) -> Mistake | None:
+    """Return what is wrong with orientations that were measured without positions, or with the order of cables."""
+    position, rotation, known = measured_poses(robot, given)
     rows = np.flatnonzero(known[:, 3:].all(axis=1))
-    if given.poses is None or known[:, :3].any() or len(rows) < FEWEST or not robot.dof_mask[3:].all():
+    if given.poses is None or len(rows) < FEWEST or not robot.dof_mask[3:].all():
         return None
+    columns, sure = likely_order(robot, lengths_of(robot, given.lengths[rows]), rotation[rows])
+    if (columns == np.arange(robot.m)).all():
+        return _in_frames(robot, given, rows, rotation)
+    text = f"{with_order('', columns, np.ones(robot.m))}, by lengths at the measured orientations"
+    if not sure:
+        return Mistake(f"{text}; another order fits as well", None, columns=columns)
+    ordered = corrected_to(given, (position, rotation, given.carrier_poses), columns, 1.0)
+    also = _in_frames(robot, ordered, rows, rotation) or Mistake("", ordered)
+    return also._replace(text=", and ".join(filter(None, (text, also.text))), columns=columns)
+
+
+def _in_frames(robot: Robot, given: Measurements, rows: np.ndarray, rotation: np.ndarray) -> Mistake | None:
+    """Return the wrong frame or convention of orientations (N, 3, 3), which some samples (rows) have, or None."""
+    assert given.poses is not None
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_SAMPLES)).astype(int))]
     carriers = None if given.carrier_poses is None else given.carrier_poses[rows]
     try:
@@ -118,8 +126,8 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
     looks = " and ".join(filter(None, (text, _said(frame, turned))))
     text = f"{looks}: they then differ from those computed from the lengths by {now} instead of {before}"
     if rest > VISIBLE:
-        return Misread(f"{text}, and by {quantity(np.degrees(rest), 'deg', 2)} in a fit of the offsets", None)
-    return Misread(text, _turned(given, whole))
+        return Mistake(f"{text}, and by {quantity(np.degrees(rest), 'deg', 2)} in a fit of the offsets", None)
+    return Mistake(text, _turned(given, whole))
 
 
 def _said(frame: str, turn: Rotation) -> str:

@@ -107,8 +107,9 @@ def _framed() -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
         along = ("x", "y", "-x", "-y")[quarters]
         named = f"with their x along {along} of {{G}}"
         yield f"in axes of which y points up, {named}", about @ up, (about @ up).T
-        for height, mirror in {"z": _MIRROR, "y": np.eye(3)[[0, 2, 1]]}.items():  # as of game engines
-            yield f"in left-handed axes of which {height} points up, {named}", about @ mirror, (about @ mirror).T
+        mirrors = {"z points up": _MIRROR, "y points up": np.eye(3)[[0, 2, 1]], "z points down": np.diag([1, 1, -1.0])}
+        for height, mirror in mirrors.items():  # as of game engines
+            yield f"in left-handed axes of which {height}, {named}", about @ mirror, (about @ mirror).T
 
 
 def _times(factor: float | np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

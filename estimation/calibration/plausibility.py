@@ -41,8 +41,7 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     rows = np.flatnonzero(tracked(robot, given))
     if len(rows) < 4:
         large = _too_large(robot, given, given.lengths * table[:, 7])
-        attitudes = None if large else misread_attitudes(robot, given)
-        return Mistake(*attitudes) if attitudes else large
+        return large or misread_attitudes(robot, given)
     known = measured(given)
     framed = given.carrier_poses is None and bool((known.any(axis=0) | (robot.dof_mask == 0))[3:].all())
     rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), MOST_SAMPLES)).astype(int)]
