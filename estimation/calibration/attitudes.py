@@ -44,11 +44,11 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Mistake | None:
     if given.poses is None or len(rows) < FEWEST or not robot.dof_mask[3:].all():
         return None
     columns, sure = likely_order(robot, lengths_of(robot, given.lengths[rows]), rotation[rows])
-    if (columns == np.arange(robot.m)).all():
-        return _in_frames(robot, given, rows, rotation)
+    same = bool((columns == np.arange(robot.m)).all())
     text = f"{with_order('', columns, np.ones(robot.m))}, by lengths at the measured orientations"
-    if not sure:
-        return Mistake(f"{text}; another order fits as well", None, columns=columns)
+    if same or not sure:
+        found = _in_frames(robot, given, rows, rotation)
+        return found if found or same else Mistake(f"{text}; another order fits as well", None, columns=columns)
     ordered = corrected_to(given, (position, rotation, given.carrier_poses), columns, 1.0)
     also = _in_frames(robot, ordered, rows, rotation) or Mistake("", ordered)
     return also._replace(text=", and ".join(filter(None, (text, also.text))), columns=columns)
