@@ -13,6 +13,8 @@ from towline.base.errors import InputError
 from towline.estimation.calibration import Measurements, corrected, left_out as module
 from towline.estimation.calibration.left_out import left_out
 from towline.estimation.calibration.plausibility import mistake
+from towline.estimation.calibration.restarts import restarts
+from towline.estimation.calibration.solving import model_of
 from towline.estimation.logs.encoders import unrolled
 from towline.models import Dynamics, load
 
@@ -216,3 +218,40 @@ def test_a_platform_that_swings_on_locked_winches_makes_cables_slack():
     assert len(result.outliers) < 0.3 * loose.sum()
     np.testing.assert_allclose([one.value for one in result.parameters], offsets, atol=1e-3)
     assert max(one.sigma for one in result.parameters) < 0.01  # by lengths of slack cables 0.1
+
+
+@pytest.mark.parametrize("cables", [slice(None), [2, 5]], ids=["all", "two"])
+@pytest.mark.parametrize("pause", [0, 40], ids=["at once", "after two seconds"])
+def test_readings_begin_anew_when_a_controller_restarts(cables, pause):
+    for seed in range(3):
+        robot, poses, y, anchors = a_motion(seed)
+        begin = 150 + 30 * seed
+        of_start = y[begin - 1, cables] + 0.1
+        y[begin:, cables] -= of_start
+        kept = np.delete(np.arange(len(y)), slice(begin, begin + pause))
+        result = calibrate(robot, Measurements(y[kept], poses[kept], times=TIMES[kept]))
+        assert result.refused is None
+        ends = [(one.value, one.sigma) for one in result.parameters if "anchor" in one.name]
+        errors, sigmas = np.abs(np.transpose(ends)[0] - anchors.ravel()), np.transpose(ends)[1]
+        assert (errors < 4 * sigmas).all()
+        assert np.median(sigmas) < 8e-3
+        assert [(one.cable, one.sample) for one in result.slips] == [(i, begin) for i in np.arange(8)[cables]]
+        np.testing.assert_allclose([one.size for one in result.slips], of_start, atol=5e-3)
+
+
+def test_a_platform_that_jumps_restarts_no_winch():
+    """A frame of the motion capture that is set anew moves all poses, and no reading."""
+    robot, poses, y, _ = a_motion()
+    poses[200:, :2] += 1.0
+    model = model_of(robot, Measurements(y, poses, times=TIMES), ("anchors", "offsets"), {})
+    assert restarts(model, 10.0) == {}
+    y[300:310, 4] += 0.5  # wrong readings return
+    assert restarts(model_of(robot, Measurements(y, poses, times=TIMES), ("anchors", "offsets"), {}), 10.0) == {}
+
+
+def test_a_cable_with_mostly_wrong_readings_is_refused():
+    robot, poses, y, _ = a_motion()
+    wrong = np.random.default_rng(1).random(len(y)) < 0.7
+    y[wrong, 3] += np.random.default_rng(2).uniform(-2, 2, wrong.sum())
+    result = calibrate(robot, Measurements(y, poses, times=TIMES), ["anchors", "offsets"])
+    assert re.match(r"[67]\d % of the readings of cables\[3\] do not fit the others", result.refused)

@@ -394,6 +394,7 @@ REFUSED = {
         r"points\[2\] must be",
     ),
     "dwell": ({"dwell": [1]}, "dwell must have one number for each of the 3 points, got 1"),
+    "dwell of another kind": ({"dwell": {"min": 1}}, r"dwell must be a number \[s\] or a list of one for each point"),
     "long dwell": ({"dwell": [1, 2, 1]}, "duration must be more than the 4 s for which path dwells, got 2 s"),
     "dwell past times": ({"dwell": [1, 0, 0], "times": [0, 1, 2]}, r"dwell\[0\] must be less than the 1 s"),
     "spline that dwells": ({"shape": "spline", "dwell": [0, 1, 0]}, "dwell must be left out with the shape spline"),

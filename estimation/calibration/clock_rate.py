@@ -24,13 +24,15 @@ class ClockRate:
     unit = "1"
 
     def __init__(self, model: Model):
-        times, self._track = model.measurements.times, model.track
+        times, track = model.measurements.times, model.track
         assert times is not None
+        assert track is not None
+        self._times, self._track = times, track.at_times(times)
         half = 0.5 * float(times[-1] - times[0])
-        self._times, self._early = times, (times - times[0]) / half - 1
         self.sigmas, self.per_second = np.array([USUAL * half]), 1 / half
 
     def model(self, model: Model, ahead: np.ndarray) -> Model:
         """Return a model with the poses by such a clock, (1,) [s]."""
-        assert self._track is not None
-        return replace(model, track=self._track.at_times(self._times + ahead[0] * self._early))
+        times = self._times
+        early = (times - times[0]) * self.per_second - 1
+        return replace(model, track=self._track.at_times(times + ahead[0] * early))

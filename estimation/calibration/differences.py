@@ -111,12 +111,13 @@ class LogPart(NamedTuple):
 
     def _without_slips(self, left: np.ndarray) -> tuple[LogPart, np.ndarray]:
         """Return the log with differences `left`, (m, N + c), without the step that a slip of a winch explains."""
-        count, y, cables = len(self.y), self.y.copy(), np.arange(len(left))
+        count, cables = len(self.y), np.arange(len(left))
         if count < FEWEST[1]:
             return self, left
-        steps = np.diff(left[:, :count], axis=1)
-        at = np.abs(steps).argmax(axis=1)
-        y += np.where(np.arange(count)[:, None] > at, steps[cables, at], 0.0)
+        at = np.abs(np.diff(left[:, :count], axis=1)).argmax(axis=1)
+        after = np.where(np.arange(count)[:, None] > at, 1.0, 0.0)
+        steps = self._replace(y=after).parts(AS_GIVEN)[1][cables, cables]
+        y = self.y + after * (left * steps).sum(axis=1) / (steps**2).sum(axis=1)
         lengths, readings = self._replace(y=y).parts(AS_GIVEN)
         slipped = medians(lengths - readings[cables, cables], count) < medians(left, count) / SLIPPED
         return self._replace(y=np.where(slipped, y, self.y)).sound(0) if slipped.any() else (self, left)

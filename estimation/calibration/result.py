@@ -84,8 +84,8 @@ class CalibrationData(Displayed):
         The log probably has an input error, the fit did not converge, an end of a cable or the CoM would move by more
         than half of the cables' length (3 % if winches are locked) or be known worse than in the file, the anchors of a
         robot without measured positions would be 3 % farther apart or closer, or its offsets are not shown, residuals
-        exceed 3 % of the cables' length, a third of the readings are outliers, the mass changes, or the file fits
-        validation samples better.
+        exceed 3 % of the cables' length, a third of all readings or half of a cable's are outliers, the mass changes,
+        or the file fits validation samples better.
         """
         if self.doubt is not None:
             return self.doubt
@@ -100,9 +100,10 @@ class CalibrationData(Displayed):
             return (
                 f"no anchors and offsets explain the log: they leave residuals of {left}, so check clocks and sensors"
             )
-        if len(self.outliers) > MOST_WRONG * self.residuals.size:
-            share = f"{100 * len(self.outliers) / self.residuals.size:.0f} %"
-            return f"{share} of the readings do not fit the others, so check clocks, frames and sensors"
+        wrong = np.bincount([one.cable for one in self.outliers], minlength=self.file.m) / len(self.residuals)
+        for share, most, whose in ((wrong.mean(), MOST_WRONG, ""), (wrong.max(), 0.5, f" of cables[{wrong.argmax()}]")):
+            if share > most:
+                return f"{100 * share:.0f} % of the readings{whose} do not fit the others: check clocks and sensors"
         if loads := load_changes(self._solved.model, self._solved.fit.state) if "mass" in self.free else []:
             texts = [f"{quantity(mass, 'kg', digits=3)} {self._since(begin)}" for begin, mass in loads]
             return f"the mass changes during the log: {', '.join(texts)}; calibrate each part alone"

@@ -31,6 +31,7 @@ from .parameters import OF_ROBOT, Parameter, Parameters
 from .pose_noise import observed
 from .projection import out_of_plane
 from .repeating_errors import Repeating, repeating
+from .restarts import restarts
 from .sightings import sighted
 from .starts import fit_from, level_poses
 
@@ -138,10 +139,11 @@ def solve(
     begin = None if near is None or near.model.has_unknown_poses else near
     model = model_of(robot, measurements, groups, prior, near=begin)
     length, taut = length_of(robot), model.weights
-    if begin is not None:
-        state = model.begin()._replace(x=begin.parameters)
-    else:
-        state = begin_with_clock(model, length) if "clock" in groups else model.begin()
+    jumps = restarts(model, length)
+    model = replace(model, parameters=replace(model.parameters, slips=tuple(jumps)))
+    state = begin_with_clock(model, length) if "clock" in groups and begin is None else model.begin()
+    parameters = begin.parameters if begin else state.x[: len(state.x) - len(jumps)]
+    state = state._replace(x=np.append(parameters, list(jumps.values())))
     model = replace(model, ahead=float(state.x[model.parameters.clock]))
     result, used = fit_from(model, state, length, outliers)
     model, fitted = replace(model, kept=used.kept), used.weights

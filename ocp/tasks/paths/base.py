@@ -104,7 +104,9 @@ def with_points_of_file(data: dict[str, Any], info: ValidationInfo, wanted: Coll
     dwell, points, origin = data.get("dwell"), data.get("points"), data.get("origin")
     if origin is not None and not isinstance(points, str):
         raise ValueError("origin must be left out unless points is the name of a file")
-    if isinstance(points, list | tuple) and isinstance(dwell, int | float) and not isinstance(dwell, bool):
+    if not isinstance(dwell, int | float | list | tuple | None) or isinstance(dwell, bool):
+        raise ValueError(f"dwell must be a number [s] or a list of one for each point, got {shown(dwell)}")
+    if isinstance(points, list | tuple) and isinstance(dwell, int | float):
         return data | {"dwell": [dwell] * len(points)}
     if not isinstance(points, str):
         return data
