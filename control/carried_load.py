@@ -58,12 +58,13 @@ class CarriedLoad:
         """Return whether a state of this time [s] was measured with this load."""
         return time > self._begun[-1][0] + ROUNDING
 
-    def continue_observer(self, platform: np.ndarray, bandwidth: float, motions: np.ndarray) -> None:
+    def continue_observer(self, platform: np.ndarray, motions: np.ndarray) -> None:
         """Keep the estimates of an observer, records (N,), for platforms with the momentum of motions (N, 12)."""
         known = np.isfinite(motions).all(axis=1)
-        if bandwidth and known.any():
+        if known.any():
             dynamics, (pose, velocity) = dynamics_of(self._of_both), np.split(motions[known], 2, axis=1)
             weight = dynamics.required_wrench(pose, 0 * velocity, 0 * velocity)
             momentum = dynamics.required_wrench(pose, 0 * velocity, velocity) - weight
+            bandwidth = np.maximum(platform["observer"][known], ROUNDING)[:, None]  # without one there is no estimate
             platform["explained"][known] = momentum - platform["disturbance"][known] / bandwidth
             platform["unseen"][known] = 0.0

@@ -60,7 +60,9 @@ class ComputedTorque(Controller):
             bandwidths are lowered by the same factor, because their attitude loops need steps of at most 0.75 /
             `attitude`, less 1.5 times the mean time for which states are held (without `State.time`: 0.93 times the
             delay of `sensors`), and 0.75 times the remainder of `rotor_lag`. Other carriers that correct errors need
-            steps of at most 0.75 / `carrier_bandwidth`.
+            steps of at most 0.75 / `carrier_bandwidth`. On robots with winches and at least as many cables as degrees
+            of freedom, the lag and delay of the motion after the commands are measured. If they leave the loop a margin
+            of less than 1.3, all gains are lowered until it is 2, also given ones, until `reset` (core/control/step.c).
         damping: Damping ratio z: Kd = 2 z b.
         integral: Ki [1/s^3], a number or one for each coordinate. It pauses while the status is not "as planned".
         observer: Bandwidth of the estimates of the disturbance and of forces on flying carriers [rad/s]; 0: no
@@ -306,7 +308,7 @@ class ComputedTorque(Controller):
             done = control_step(*fixed, None, None, *own, late if observes else seen_so, *self._arrays)
             self._late = seen_so
             if not observes:
-                self._carried.continue_observer(self._platform, float(self._settings["observer"]), seen_so[:, 0])
+                self._carried.continue_observer(self._platform, seen_so[:, 0])
         self._planned, (missing, self._optimal, self._are_far) = self._carriers[:, :, 2].copy(), done
         self._is_missing = missing > 0  # cables or their sensors
         self._time, self._seen, self._elapsed = time, seen, dt

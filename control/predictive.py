@@ -143,6 +143,7 @@ class Predictive(ComputedTorque):
         self._beside = ComputedTorque(the_robot, reach=given, sensors=sensors, rotor_lag=rotor_lag, **loops)
         loops |= {"tension_loop": tension_loop, "tension_lag": tension_lag, "rotor_lag": rotor_lag}
         super().__init__(the_robot, observer=own.observer, reach=reach, **loops)
+        self._settings["lowers"] = 0  # the watch finds a lag, and the other controller bears it
         self._known_age, self._beside._ahead = self._beside._known_age, None  # drives do not follow its commands
         if self._ahead is not None:
             self._ahead.amplify(own.lead, own.lag)

@@ -16,6 +16,7 @@ CONTROLLER = np.dtype(
         *((name, "f8", 6) for name in ("kp", "kd", "ki")),
         *((name, "f8") for name in ("observer", "learning", "patience")),
         *((name, "i4") for name in ("reacts", "corrects")),
+        ("lowers", "i8"),
         *((name, "f8") for name in ("carrier_bandwidth", "carrier_acceleration")),
         ("reach", "f8", (MOST_CARRIERS, 6)),
         *((name, "f8") for name in ("place", "attitude")),
@@ -30,12 +31,19 @@ CABLE = np.dtype(
         ("is_cut", "i8"),
     ]
 )
+_AXIS = np.dtype(
+    [*((name, "f8") for name in ("usual", "order")), *((name, "f8", 2) for name in ("late", "rate", "unseen"))]
+)
+_LATENESS = np.dtype([("sums", "f8", 6), ("compared", "f8"), ("has_begun", "i8")])
 PLATFORM = np.dtype(
     [
         *((name, "f8", 6) for name in ("integral", "disturbance", "explained")),
         *((name, "f8") for name in ("unseen", "attitude")),
         ("integrates", "i8"),
         ("silent", "i8"),
+        ("axis", _AXIS, 6),
+        ("lateness", _LATENESS),
+        *((name, "f8") for name in ("lag", "observer")),
     ]
 )
 _TURN = np.dtype([("steady", "f8", 6), *((name, "f8", 3) for name in ("bent", "away", "rate"))])
@@ -51,12 +59,7 @@ CARRIER = np.dtype(
         ("turn", _TURN),
     ]
 )
-_AXIS = np.dtype(
-    [*((name, "f8") for name in ("usual", "order")), *((name, "f8", 2) for name in ("late", "rate", "unseen"))]
-)
-TURNING = np.dtype(
-    [("axis", _AXIS, (MOST_CARRIERS, 3)), ("sums", "f8", 6), ("lag", "f8"), ("compared", "f8"), ("has_begun", "i8")]
-)
+TURNING = np.dtype([("axis", _AXIS, (MOST_CARRIERS, 3)), ("lateness", _LATENESS), ("lag", "f8")])
 TETHER = np.dtype(
     [
         *((name, "i4") for name in ("carrier", "cables")),

@@ -56,6 +56,7 @@ def settings_of(
     patience = number("patience", patience, 1e-6, 1e6)
     # Cables of a fixed length have no winch that could be off: their tensions are what carriers make of them.
     has_winches = robot.fixed_lengths is None
+    settings["lowers"] = has_winches and not settings["corrects"]
     settings["learning"], settings["patience"] = (SLOW, patience) if has_winches else (0.0, np.inf)
     settings["place"] = number("place", place, 0.1, 1e3)
     for name, values in limits._asdict().items():

@@ -24,6 +24,7 @@ typedef struct {
     double patience;  /* how long a cable may report no tension where one is commanded until it is taken for cut [s] */
     int32_t reacts;   /* 1: carriers leave their reference to help the tensions, */
     int32_t corrects; /* 1: also to correct errors */
+    int64_t lowers;       /* 1: bandwidths are lowered if the platform follows its commands too late, see step.c */
     double carrier_bandwidth, carrier_acceleration; /* of that motion [rad/s], and at most [m/s^2, rad/s^2] */
     double reach[TOWLINE_MOST_CARRIERS][6];         /* how far each coordinate may go [m, rad] */
     double place;                                   /* bandwidth with which flying carriers keep their place [rad/s] */
@@ -47,6 +48,24 @@ typedef struct {
     int64_t is_cut;   /* 1 for a cable that is taken for cut */
 } towline_cable_memory;
 
+/* How one coordinate follows orders: what is ordered, and what is measured; see lateness.c. */
+typedef struct {
+    double usual;            /* rate, in the mean of the last time */
+    double order;            /* integral of the ordered acceleration, without what it was long ago */
+    double late[2], rate[2]; /* x and r, after one low-pass filter and after two */
+    double unseen[2]; /* time without a measured rate [s], and the integral of the ordered acceleration over it */
+} towline_late_axis;
+
+enum { TOWLINE_LATENESS_SUMS = 6 };
+
+/* How late several coordinates are. Sums over recent time are of (x - r) r', (x - r) r'', r' r', r' r'', r'' r'' and
+   (x - r)^2. */
+typedef struct {
+    double sums[TOWLINE_LATENESS_SUMS];
+    double compared;   /* time since the comparison began [s] */
+    int64_t has_begun; /* 1 after the first step */
+} towline_lateness;
+
 /* What is remembered of the platform's motion: forces [N] in {G}, and moments [N m] about the CoM. */
 typedef struct {
     double integral[6];    /* of the error */
@@ -56,6 +75,10 @@ typedef struct {
     double attitude;       /* bandwidth with which flying carriers turn [rad/s] */
     int64_t integrates;    /* 1: the integral goes on */
     int64_t silent;        /* steps in which tensions were commanded and no sensor reported one; from 2 on it matters */
+    towline_late_axis axis[6];
+    towline_lateness lateness;
+    double lag;      /* T + 2.4 C / T of step.c, if that is so long that bandwidths are lowered, else 0 [s] */
+    double observer; /* bandwidth of the estimate [rad/s] */
 } towline_platform_memory;
 
 /* How a carrier turns, in its own axes: measured, or predicted while no state is measured. */
@@ -80,24 +103,11 @@ typedef struct {
     towline_turn turn;
 } towline_carrier_memory;
 
-/* How an axis of a carrier turns: what is ordered, and what is measured; see turning.c. */
+/* How late the carriers of a robot turn; see turning.c. */
 typedef struct {
-    double usual;            /* rate, in the mean of the last time */
-    double order;            /* integral of the ordered acceleration, without what it was long ago */
-    double late[2], rate[2]; /* x and r, after one low-pass filter and after two */
-    double unseen[2]; /* time without a measured rate [s], and the integral of the ordered acceleration over it */
-} towline_turning_axis;
-
-enum { TOWLINE_TURNING_SUMS = 6 };
-
-/* How late the carriers of a robot turn. Sums over recent time are of (x - r) r', (x - r) r'', r' r', r' r'', r'' r''
-   and (x - r)^2. */
-typedef struct {
-    towline_turning_axis axis[TOWLINE_MOST_CARRIERS][3];
-    double sums[TOWLINE_TURNING_SUMS];
-    double lag;        /* of carriers that turn too late, else 0 [s] */
-    double compared;   /* time since the comparison began [s] */
-    int64_t has_begun; /* 1 after the first step */
+    towline_late_axis axis[TOWLINE_MOST_CARRIERS][3];
+    towline_lateness lateness;
+    double lag; /* of carriers that turn too late, else 0 [s] */
 } towline_turning;
 
 enum { TOWLINE_MOST_TETHERS = 3 };

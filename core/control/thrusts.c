@@ -274,8 +274,8 @@ double towline_write_thrusts(const towline_robot *robot, const towline_controlle
         }
     }
     if (flight.turning) {
-        towline_measure_lag(robot, controller->attitude, dt, (const double (*)[3])ordered, flight.memory,
-                            flight.turning);
+        towline_measure_turning(robot, controller->attitude, dt, (const double (*)[3])ordered, flight.memory,
+                                flight.turning);
         if (flight.turning->lag > 0) {
             flight.platform->attitude = fmin(controller->attitude, 1 / flight.turning->lag);
         }

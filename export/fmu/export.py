@@ -41,7 +41,7 @@ _OWN = Path(__file__).parent / "sources"
 _COMPILED = (
     "plant/*.c",
     "distribution/*.c",
-    *(f"control/{n}.c" for n in ("step", "heard", "compensation", "thrusts", "turning")),
+    *(f"control/{n}.c" for n in ("step", "heard", "compensation", "thrusts", "turning", "lateness")),
 )
 _HEADERS = ("*.h", *(f"{folder}/*.h" for folder in ("plant", "distribution", "control", "mechanics", "numbers")))
 _DEFINITIONS = {"TOWLINE_CABLES": str(MOST_CABLES)}
