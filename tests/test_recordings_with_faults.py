@@ -1,6 +1,7 @@
 """Sensors that fail while they record: stuck encoders, counters that begin again, clocks that are set, slack cables."""
 
 import re
+from time import process_time
 
 import numpy as np
 import pytest
@@ -15,9 +16,11 @@ from towline.estimation.calibration.left_out import left_out
 from towline.estimation.calibration.plausibility import mistake
 from towline.estimation.calibration.restarts import restarts
 from towline.estimation.calibration.solving import model_of
+from towline.estimation.logs import read_log
 from towline.estimation.logs.encoders import unrolled
 from towline.models import Dynamics, load
 
+from . import user_recordings as user
 from .framed import framed
 from .test_calibration_mistakes import a_log, seen
 from .user_recordings import FRAME, PLATFORM, robot_file, write
@@ -255,3 +258,66 @@ def test_a_cable_with_mostly_wrong_readings_is_refused():
     y[wrong, 3] += np.random.default_rng(2).uniform(-2, 2, wrong.sum())
     result = calibrate(robot, Measurements(y, poses, times=TIMES), ["anchors", "offsets"])
     assert re.match(r"[67]\d % of the readings of cables\[3\] do not fit the others", result.refused)
+
+
+@pytest.mark.parametrize("seed", [1, 3, 5])
+def test_cables_that_are_slack_while_the_platform_stands_on_the_floor(seed):
+    """It stands for 16 s before and after a motion of 20 s, with cables that are 2 to 15 cm longer than the way."""
+    robot, poses, y, anchors = a_motion(seed)
+    draw, rest, winding = np.random.default_rng(seed), 320, 20
+    slack = draw.uniform(0.02, 0.15, 8)
+    stood, wound = np.repeat([0, len(y) - 1], rest), np.linspace(1, 0, winding)[:, None]
+    y[:winding] += wound * slack
+    y[-winding:] += wound[::-1] * slack
+    still = y[stood] + draw.normal(0, 3e-4, (2 * rest, 8))
+    y, poses = (np.concatenate([a[:rest], b, a[rest:]]) for a, b in ((still, y), (poses[stood], poses)))
+    poses += draw.normal(0, [*[5e-4] * 3, *[1e-4] * 3], poses.shape)
+    result = calibrate(robot, Measurements(y, poses, times=0.05 * np.arange(len(y))))
+    assert result.refused is None
+    ends = [(one.value, one.sigma) for one in result.parameters if "anchor" in one.name]
+    errors, sigmas = np.abs(np.transpose(ends)[0] - anchors.ravel()), np.transpose(ends)[1]
+    assert (errors < 4 * sigmas).all()
+    assert np.median(sigmas) < 5e-3
+    assert result.residual_after < 6e-4  # a reading at the end of the poses is no exception
+    wrong = np.zeros(y.shape, dtype=bool)
+    wrong[[one.sample for one in result.outliers], [one.cable for one in result.outliers]] = True
+    assert wrong[rest + 2 * winding : -rest - 2 * winding].mean() < 0.02
+
+
+@pytest.mark.parametrize("written", ["late", "by a clock that was set back", "after a clock that was set back halfway"])
+def test_lines_that_are_written_late_are_sorted(written, tmp_path):
+    """Only those that fill a gap: where a clock was set back, there are two lines where one is usual."""
+    _, poses, y, _ = a_motion()
+    at, rows = TIMES.copy(), np.arange(len(TIMES))
+    if written == "late":
+        for first in (30, 100, 102, 390):
+            rows[[first, first + 1]] = rows[[first + 1, first]]
+        rows[200:204] = 201, 202, 203, 200
+        rows = np.insert(rows, 50, rows[50])  # and one twice
+    else:
+        at[200:] -= 0.1 if written == "by a clock that was set back" else 0.125
+    write(tmp_path / "log.csv", ["t", *POSE[0], *POSE[1]], np.column_stack([at, y, poses])[rows])
+    if written != "late":
+        with pytest.raises(InputError, match=r"times must increase .* cut the log where its clock was set back"):
+            read_measurements(tmp_path / "log.csv", robot="cogiro")
+        return
+    found = read_log(tmp_path / "log.csv", robot=load("cogiro"))
+    assert "lines sorted by their times because they were written late: 5" in found.notes
+    np.testing.assert_allclose(found.measurements.lengths, y, atol=1e-8)
+    np.testing.assert_allclose(found.measurements.times, TIMES, atol=1e-8)
+
+
+def test_a_wrong_sign_on_four_cables_is_named_at_once(tmp_path):
+    """No parameters fit such readings: neither the rate of a clock nor further parameters are worth a fit."""
+    user.four_cables(tmp_path)
+    robot = load(user.hanging_robot(tmp_path))
+    log = read_measurements(tmp_path / "winches.csv", poses=tmp_path / "mocap.csv", robot=robot)
+    y = log.lengths.copy()
+    y[:, 1] *= -1
+    begin = process_time()
+    result = calibrate(robot, log.changed(lengths=y))
+    wrong = process_time() - begin
+    assert "l1 seems to have the wrong sign" in result.refused
+    begin = process_time()
+    assert calibrate(robot, log).refused is None
+    assert wrong < 4 * (process_time() - begin)

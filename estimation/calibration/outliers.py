@@ -21,6 +21,7 @@ from .normal_equations import NormalEquations, metric, pose_equations
 from .parameters import Parameters
 from .products import quadratic_forms
 from .projection import Projected, parts, project
+from .representative import of_motion
 
 LEVEL = 0.005  # share of sound readings among several outliers
 LEAST_THRESHOLD = 5.0  # sigmas; errors have longer tails than the normal distribution
@@ -132,14 +133,15 @@ def robust(model: Model, state: State, length: float, rough: float = np.inf) -> 
     each minimum is near the one before (graduated non-convexity, Yang et al. 2020). Plain least squares would move
     unknown poses and parameters towards wrong readings, until sound ones look wrong.
 
-    In a long log with known poses, the parameters are fitted to some samples, and all readings compared with them.
+    With known poses, the parameters are fitted to some samples of a long log, and to few of each rest: otherwise cables
+    that are slack before and after the motion would count as most readings. All readings are compared with this fit.
 
     - `rough`: first limit, in the final ones, if the state is good enough for it.
     """
-    count = len(model.measurements)
-    if model.size_is_open or count <= MOST_SAMPLES:
+    rows = of_motion(model.measurements)
+    if model.size_is_open or len(rows) == len(model.measurements) <= MOST_SAMPLES:
         return _robust(model, state, length, rough)[:2]
-    rows = np.linspace(0, count - 1, MOST_SAMPLES).astype(int)
+    rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), MOST_SAMPLES)).astype(int)]
     part = model.only(rows)
     found, _, least = _robust(part, fit(part, state.only(rows), length).state, length, rough)
     at = state._replace(x=found.x)

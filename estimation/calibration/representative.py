@@ -18,6 +18,8 @@ LEAST = 0.5  # of the stated standard deviations: a smaller noise does not matte
 BLOCKS, BLOCK = 20, 1000  # of successive samples where forces count, which take far longer
 CHANCE = 4.0  # standard deviations of a ratio of roughnesses, at most 1 / sqrt(n) each
 MEASURED = 0.5  # of the samples: values that are missing more often do not show the motion
+RESTING = 25  # successive samples with hardly different readings, which are a part of a rest
+MATTERS = 0.1  # of a log: shorter rests, or a shorter motion, do not
 THIN = 10  # samples apart, those that show what a block is like
 
 
@@ -34,6 +36,25 @@ def representative(robot: Robot, measurements: Measurements) -> np.ndarray | Non
     if len(rows) > 2 * BLOCKS * BLOCK and (measurements.tensions is not None or hangs(robot, measurements)):
         rows = rows[_blocks(measurements.only(rows))]
     return rows if len(rows) < count else None
+
+
+def of_motion(measurements: Measurements) -> np.ndarray:
+    """Return the samples in motion and the first one of each rest, (k,); all if rests are too short to matter.
+
+    However long a rest is, its readings are one statement about the geometry. All samples are also returned if there is
+    hardly any motion.
+    """
+    every = np.arange(len(measurements))
+    whole = len(every) // RESTING
+    if measurements.times is None or not whole:
+        return every
+    blocks = measurements.lengths[: whole * RESTING].reshape(whole, RESTING, -1)
+    rests = (blocks.std(axis=1) < measurements.sigma.lengths).all(axis=1)
+    if not MATTERS < rests.mean() < 1 - MATTERS:
+        return every
+    used = np.repeat(~rests, RESTING)
+    used[RESTING * np.flatnonzero(np.diff(rests, prepend=False) & rests)] = True
+    return np.append(np.flatnonzero(used), every[len(used) :])
 
 
 def _blocks(log: Measurements) -> np.ndarray:

@@ -26,6 +26,7 @@ from .outliers import Outlier, Slip
 from .parameters import IN_BALANCE, Parameter, Parameters
 from .plausibility import Mistake
 from .repeating_errors import Repeating
+from .representative import of_motion
 from .solving import Noise, Solved, covariance_of, lengths_of
 
 EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
@@ -84,8 +85,8 @@ class CalibrationData(Displayed):
         The log probably has an input error, the fit did not converge, an end of a cable or the CoM would move by more
         than half of the cables' length (3 % if winches are locked) or be known worse than in the file, the anchors of a
         robot without measured positions would be 3 % farther apart or closer, or its offsets are not shown, residuals
-        exceed 3 % of the cables' length, a third of all readings or half of a cable's are outliers, the mass changes,
-        or the file fits validation samples better.
+        exceed 3 % of the cables' length, a third of all readings or half of a cable's are outliers (rests count once),
+        the mass changes, or the file fits validation samples better.
         """
         if self.doubt is not None:
             return self.doubt
@@ -100,7 +101,9 @@ class CalibrationData(Displayed):
             return (
                 f"no anchors and offsets explain the log: they leave residuals of {left}, so check clocks and sensors"
             )
-        wrong = np.bincount([one.cable for one in self.outliers], minlength=self.file.m) / len(self.residuals)
+        outliers, is_wrong = self._solved.outliers, np.zeros(self.residuals.shape, dtype=bool)
+        is_wrong[[one.sample for one in outliers], [one.cable for one in outliers]] = True
+        wrong = is_wrong[of_motion(self.measurements)].mean(axis=0)
         for share, most, whose in ((wrong.mean(), MOST_WRONG, ""), (wrong.max(), 0.5, f" of cables[{wrong.argmax()}]")):
             if share > most:
                 return f"{100 * share:.0f} % of the readings{whose} do not fit the others: check clocks and sensors"

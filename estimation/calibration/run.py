@@ -72,6 +72,8 @@ def calibrate(
         check_enough(chosen, given, groups, priors)
     first = loose(length_of(chosen), groups, priors)
     solved = solve(chosen, given, groups, first, outliers)
+    if found and found.severe:  # nothing that follows would mean anything
+        return Calibration(solved, groups, first, found, samples)
     forces = solved.model.forces
     of_forces = [name for name in groups if name in (*IN_BALANCE, "elasticity")]
     if of_forces and forces is not None and not forces.motion_is_known:
@@ -86,7 +88,7 @@ def calibrate(
                 f"{int(tracked(chosen, given).sum())} of {len(given)}: longer gaps and open ends hide accelerations"
             )
     unobserved: tuple[str, ...] = ()
-    if first == priors and not (found and found.severe) and (loosely := undetermined(solved)):
+    if first == priors and (loosely := undetermined(solved)):
         first, unobserved = priors | loosely, solved.observability.open
         solved = solve(chosen, given, groups, first, outliers)
     if first != priors:
@@ -104,7 +106,7 @@ def calibrate(
             elastic = solve(chosen, given, longer, sigmas, outliers, near)
             if is_elastic(elastic):
                 groups, priors, solved = longer, sigmas, elastic
-        if (found and found.severe) or (longer := extended(solved, groups, priors)) == groups:
+        if (longer := extended(solved, groups, priors)) == groups:
             break
         groups, solved = longer, solve(chosen, given, longer, priors, outliers)
     for _ in range(ROUNDS_OF_SLACK):

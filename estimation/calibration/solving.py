@@ -153,8 +153,6 @@ def solve(
     if has_carrier_clocks(robot, measurements):
         recorded = CarrierClocks(robot, measurements)
         model, result, clocks = with_clocks(model, result, recorded, None, length, search=True)
-    elif model.track and model.carriers is None:
-        recorded = clocks.recorded if clocks else ClockRate(model)
     wrong: dict[tuple[int, int], Outlier] = {}
     slips: list[Slip] = []
     for _ in range(ROUNDS if outliers else 0):
@@ -178,8 +176,12 @@ def solve(
         wrong |= {(one.cable, one.sample): one for one in found}
         model = replace(model, weights=model.weights & ~left)
         result, fitted = fit(model, result.state, length), model.weights
+    # A clock that still changes must bring in no readings that no test has seen.
+    model = replace(model, weights=model.weights & model.inside(result.state)) if outliers else model
     model, result = _weighed(model, result, length, True)
     seen = observed(model, result.state, length)
+    if recorded is None and result.converged and model.track and model.carriers is None:
+        recorded = clocks.recorded if clocks else ClockRate(model)
     if recorded is not None:
         model, result, clocks = with_clocks(model, result, recorded, clocks, length)
         seen = clocks.widened(observed(model, result.state, length))

@@ -12,6 +12,8 @@ from .names import UNITS, dated_unit, time_unit
 from .recording import GAP, Field, Samples, Topic, check_rising, plain
 
 MOST_REPEATED = 0.2  # of the samples of a table, that may repeat a time
+MOST_LATE, LATEST = 0.2, 5  # share of the lines of a table that may be written late, and by how many lines each
+FILLS = 0.6  # of the usual step, by which a late line is apart from its neighbours
 FEWEST, STEADY = 20, 5.0  # samples, and how many times the usual step the longest one of a time may be
 DAY = 86400.0  # [s]
 MOST_PARTIAL = 0.2  # of the samples, of which some but not all cables were measured
@@ -69,6 +71,12 @@ class Reader:
                 steps = np.diff(times, prepend=np.nan)
                 if np.nanmax(times, initial=0.0) < DAY:  # times of day, which begin again at midnight
                     times = times + DAY * np.cumsum(steps < -0.5 * DAY)
+                rows = in_order(times)
+                if rows is not None:
+                    late = quantity(int((np.diff(times) < 0).sum()))
+                    self.notes.append(f"lines sorted by their times because they were written late: {late}")
+                    times, values = times[rows], values[rows]
+                    steps = np.diff(times, prepend=np.nan)
                 again = steps == 0
                 if 0 < again.sum() <= MOST_REPEATED * len(again):
                     count = quantity(int(again.sum()))
@@ -91,6 +99,21 @@ class Reader:
                 f"in its name, as {clock.full}_s"
             )
         return unit
+
+
+def in_order(times: np.ndarray) -> np.ndarray | None:
+    """Return the order of lines whose times (N,) rise if a few lines were written late, (N,); else None.
+
+    Each of these fills a gap between its neighbours. A clock that was set back instead leaves two samples where one is
+    usual.
+    """
+    rows = np.argsort(times, kind="stable")
+    moved, steps = rows != np.arange(len(rows)), np.diff(times[rows])
+    if not 0 < moved.mean() <= MOST_LATE or np.abs(rows - np.arange(len(rows))).max() > LATEST:
+        return None
+    around, apart = (moved[1:] | moved[:-1]) & (steps != 0), np.median(steps)
+    again = (steps == 0).sum() > (np.diff(times) == 0).sum()
+    return None if again or (steps[around] < FILLS * apart).any() else rows
 
 
 def like_time(topic: Topic, used: set[str]) -> str | None:
