@@ -43,19 +43,32 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Mistake | None:
     rows = np.flatnonzero(known[:, 3:].all(axis=1))
     if given.poses is None or len(rows) < FEWEST or not robot.dof_mask[3:].all():
         return None
-    columns, sure = likely_order(robot, lengths_of(robot, given.lengths[rows]), rotation[rows])
-    same = bool((columns == np.arange(robot.m)).all())
-    text = f"{with_order('', columns, np.ones(robot.m))}, by lengths at the measured orientations"
-    if same or not sure:
-        found = _in_frames(robot, given, rows, rotation)
-        return found if found or same else Mistake(f"{text}; another order fits as well", None, columns=columns)
-    ordered = corrected_to(given, (position, rotation, given.carrier_poses), columns, 1.0)
-    also = _in_frames(robot, ordered, rows, rotation) or Mistake("", ordered)
-    return also._replace(text=", and ".join(filter(None, (text, also.text))), columns=columns)
+    noise = given.sigma.lengths, given.sigma.rotation
+    lengths = lengths_of(robot, given.lengths[rows])
+    columns, sure, heading, explained = likely_order(robot, lengths, rotation[rows], noise)
+    by = Rotation.from_rotvec(-heading * np.array(robot.gravity) / max(np.linalg.norm(robot.gravity), 1e-12))
+    turned = by.magnitude() > VISIBLE
+    text = with_order("", columns, np.ones(robot.m))
+    if not sure:
+        return Mistake(f"{text}, by lengths at the measured orientations; another order fits as well", None)
+    if not text and not turned:
+        return _in_frames(robot, given, rows, rotation, MOUNTED if explained else VISIBLE)
+    text = " and ".join(filter(None, (text, _said("world", by) if turned else "")))
+    placed = position, (by * Rotation.from_matrix(rotation)).as_matrix() if turned else rotation, given.carrier_poses
+    corrected = corrected_to(given, placed, columns, 1.0)
+    also = None if turned else _in_frames(robot, corrected, rows, rotation)
+    text = f"{text}, by lengths at the measured orientations"
+    also = also._replace(text=f"{text}, and {also.text}") if also else Mistake(text, corrected)
+    return also._replace(columns=columns)
 
 
-def _in_frames(robot: Robot, given: Measurements, rows: np.ndarray, rotation: np.ndarray) -> Mistake | None:
-    """Return the wrong frame or convention of orientations (N, 3, 3), which some samples (rows) have, or None."""
+def _in_frames(
+    robot: Robot, given: Measurements, rows: np.ndarray, rotation: np.ndarray, visible: float = VISIBLE
+) -> Mistake | None:
+    """Return the wrong frame or convention of orientations (N, 3, 3), which some samples (rows) have, or None.
+
+    - `visible`: least turn that noise, or displaced anchors, do not explain [rad].
+    """
     assert given.poses is not None
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_SAMPLES)).astype(int))]
     carriers = None if given.carrier_poses is None else given.carrier_poses[rows]
@@ -119,7 +132,7 @@ def _in_frames(robot: Robot, given: Measurements, rows: np.ndarray, rotation: np
         turned, whole = ((more * one if frame == "world" else one * more) for one in (turned, whole))
         cost, turns = _fitted(robot, _turned(given, whole))
         rest = float(np.median(np.linalg.norm(turns["world"], axis=1)))
-    small = bool(frame) and not text and turned.magnitude() < VISIBLE
+    small = bool(frame) and not text and turned.magnitude() < visible
     if small or cost > LIKELIER * as_given:  # offsets and the CoM may explain the differences as well
         return None
     now, before = (quantity(np.degrees(part), "deg", 2) for part in (size, as_they_are[1]))
