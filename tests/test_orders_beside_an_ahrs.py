@@ -14,15 +14,15 @@ SIGMA = {"lengths": 1e-3, "rotation": np.radians(0.5)}
 REFLECTION = np.diag([1, -1.0, 1])
 
 
-def a_log(folder, m, seed, count=28):
+def a_log(folder, m, seed, count=28, irregular=1.0):
     """An irregular robot in a cuboid, the true orientations at random poses, readings there, and measured ones."""
     draw = np.random.default_rng(seed)
     size = draw.uniform(1, 10)
     corners = size * np.array([[1, 0.8, 0], [-1, 0.8, 0], [-1, -0.8, 0], [1, -0.8, 0]])
     upper, lower = [0, 0, 1.2 * size], [0, 0, -0.8 * size]
-    anchors = np.vstack([corners + upper, corners + lower])[:m] + draw.normal(0, 0.04 * size, (m, 3))
+    anchors = np.vstack([corners + upper, corners + lower])[:m] + irregular * draw.normal(0, 0.04 * size, (m, 3))
     ends = np.vstack([0.13 * corners - [0, 0, 0.1 * size], 0.13 * corners + [0, 0, 0.1 * size]])[:m]
-    ends = ends + draw.normal(0, 0.012 * size, (m, 3))
+    ends = ends + irregular * draw.normal(0, 0.012 * size, (m, 3))
     cables = "\n".join(
         f"  - {{carrier: frame, anchor: {a}, attachment: {b}, t_min: 1, t_max: 2000}}"
         for a, b in zip(anchors.tolist(), ends.tolist(), strict=True)
@@ -60,6 +60,18 @@ def test_an_order_of_four_cables_is_sure_only_if_it_is_right(tmp_path):
             assert not likely.sure or likely.columns.tolist() in accepted
             named += bool((likely.columns != np.arange(4)).any())
     assert named >= 5  # robots that are irregular enough to show that the given order is wrong
+
+
+def test_the_order_of_a_symmetric_robot_is_never_sure(tmp_path):
+    """Half a revolution of the order is half a revolution of the heading."""
+    named = 0
+    for seed in range(6):
+        robot, _, y, rotation, _ = a_log(tmp_path, 4, seed, irregular=0.0)
+        likely = likely_order(robot, y[:, [1, 0, 2, 3]], rotation.as_matrix(), (1e-3, SIGMA["rotation"]))
+        if likely.columns.tolist() != [0, 1, 2, 3]:
+            assert not likely.sure
+            named += 1
+    assert named >= 2
 
 
 @pytest.mark.parametrize("m", [6, 7, 8])
