@@ -34,7 +34,7 @@ MOST_STEPS = 40  # of a fit with measured poses, which is nearly linear: others 
 FEWEST = 40  # samples in all; of fewer, every other sample is left out
 CHANCE = 3.0  # times the logarithm of the number of residuals, by which a parameter of forces must reduce their squares
 UNEXPLAINED = 1.05  # times the stated standard deviation, of residuals that parameters may explain
-CLEARLY, EXPLAINED = 1.25, 0.5  # times smaller errors of validation samples, or share of the variance that repeats
+CLEARLY, EXPLAINED = 1.15, 0.5  # times smaller errors of validation samples, or share of the variance that repeats
 WORSE = 1.02  # of the smallest error left out that a smaller set of parameters may have
 CLEANED = {"anchors", "offsets", "clock"}  # found while wrong readings are looked for
 FORCES = ("mass", "com", "capstan", "friction", "zeros")  # of which auto selects
@@ -141,10 +141,9 @@ def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[st
 
 
 def extended(solved: Solved, free: tuple[str, ...], prior: dict[str, float]) -> tuple[str, ...]:
-    """Return `free` with attachments, scales, build-up and radii as far as they explain errors that repeat.
+    """Return `free` with attachments, scales, build-up, radii and elasticity as far as they explain errors that repeat.
 
-    They do if validation samples are predicted clearly better, or by half of the errors that repeat. Stretch of cables
-    is their rival where it can be known.
+    They do if validation samples are predicted clearly better, or by half of the errors that repeat.
     """
     of = solved.model
     known = {"anchors", "offsets"} <= {*free} and not of.size_is_open and of.robot.fixed_lengths is None
@@ -159,8 +158,7 @@ def extended(solved: Solved, free: tuple[str, ...], prior: dict[str, float]) -> 
     residuals = lengths_of(of, solved.fit.state).T[of.weights]
     part = EXPLAINED * repeats.sigma**2 * float((residuals**2).mean())
     least = max(errors[free] / CLEARLY, np.sqrt(max(errors[free] ** 2 - part, 0.0)))
-    best = held_out.best if errors[held_out.best] < least else free
-    return tuple(name for name in best if name in free or name != "elasticity")  # whose own test is stricter
+    return held_out.best if errors[held_out.best] < least else free
 
 
 def _nested(robot: Robot, measurements: Measurements) -> list[tuple[str, ...]]:

@@ -22,6 +22,7 @@ FEWEST_MOVING = 50  # samples without times; fewer are always taken to be at res
 SMALL, SMOOTH = 0.05, 0.7  # steps of a motion over its extent, and their changes over the steps
 DEGREE, WIDER = 8, 3  # of polynomials, through so many times the neighbours of parabolas
 FEWEST_NEIGHBOURS = 9  # of parabolas: where there are fewer, wider polynomials are far noisier near ends of a log
+HOLLOW = 11  # samples that accelerations leave out; poses are smoothed over as many
 MOST_NEIGHBOURS = 250  # of parabolas, to each side: with 25 at 1 kHz, noise of the accelerations hides the mass
 SLOWEST = 0.2  # [s] between samples of a motion; if they are farther apart, the platform is taken to be at rest
 
@@ -106,7 +107,9 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
     narrow = max(of_poses, within(times, most=MOST_NEIGHBOURS))
     wide = WIDER * (narrow - 1) + 1
     smooths = narrow >= FEWEST_NEIGHBOURS and wide <= count / 4
-    local = Polynomials(times, wide, DEGREE) if smooths else Polynomials(times, of_poses)
+    # Noise of a pose in the tensions at that pose would look like stretch.
+    hollow = HOLLOW if measurements.tensions is None and wide >= 5 * HOLLOW else 0
+    local = Polynomials(times, wide, DEGREE, hollow=hollow) if smooths else Polynomials(times, of_poses)
     moved, inverse = local.fitted(np.hstack([position, quaternions])), quaternions * [-1, -1, -1, 1]
     rate, spin = (2 * _vector_of_product(part[:, 3:], inverse) for part in (moved.slopes, moved.bends))
     sigma = moved.noise[2, :, :3].max(axis=1)

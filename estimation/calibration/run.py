@@ -17,7 +17,7 @@ from .sensor_errors import has_zeros, is_askew, with_mount, with_zeros
 from .solving import solve
 from .stretch import is_elastic, uses_slack, with_elasticity, with_stretch
 
-ROUNDS_OF_STRETCH = 2  # without and with further parameters of the geometry
+ROUNDS_OF_STRETCH = 3  # and of further parameters of the geometry
 ROUNDS_OF_SLACK = 3
 
 
@@ -101,14 +101,17 @@ def calibrate(
         groups, priors = with_zeros(given, groups, priors)
         solved = solve(chosen, given, groups, priors, outliers)
     for _ in range(ROUNDS_OF_STRETCH):
-        if (near := with_stretch(solved)) is not None:
+        better = extended(solved, groups, priors)
+        if (better == groups or "elasticity" in better) and (near := with_stretch(solved)) is not None:
             longer, sigmas = with_elasticity(solved)
             elastic = solve(chosen, given, longer, sigmas, outliers, near)
             if is_elastic(elastic):
                 groups, priors, solved = longer, sigmas, elastic
-        if (longer := extended(solved, groups, priors)) == groups:
+                continue
+        better = tuple(name for name in better if name in groups or name != "elasticity")  # whose own test is stricter
+        if better == groups:
             break
-        groups, solved = longer, solve(chosen, given, longer, priors, outliers)
+        groups, solved = better, solve(chosen, given, better, priors, outliers)
     for _ in range(ROUNDS_OF_SLACK):
         if not uses_slack(solved):
             break

@@ -57,12 +57,13 @@ class Polynomials:
     """Polynomials of a degree by least squares through `width` neighbours of each sample, at times (N,) [s].
 
     Samples before and after a pause are no neighbours, unless those between two pauses are too few for a polynomial.
-    If `fading`, farther neighbours count less (Hann window). They are computed for some samples at a time, because
-    those of a million samples would take more than a gigabyte.
+    If `fading`, farther neighbours count less (Hann window). The `hollow` nearest samples are left out. Polynomials are
+    computed for some samples at a time, because those of a million samples would take more than a gigabyte.
     """
 
-    def __init__(self, times: np.ndarray, width: int, degree: int = 2, fading: bool = False):
+    def __init__(self, times: np.ndarray, width: int, degree: int = 2, fading: bool = False, hollow: int = 0):
         self._times, self._width, self._degree, self._fading, count = times, width, degree, fading, len(times)
+        self._hollow = hollow
         ends = np.concatenate([[0], after_pauses(times), [count]])
         sizes = np.diff(ends)
         self._first = np.repeat(np.where(sizes < width, 0, ends[:-1]), sizes)  # neighbour that each sample may have
@@ -81,6 +82,8 @@ class Polynomials:
         if self._fading:
             far = np.minimum(np.abs(rows - at[:, None]) / (width // 2 + 1), (width // 2) / (width // 2 + 1))
             transposed = transposed * (np.cos(np.pi / 2 * far) ** 2)[:, None]
+        if self._hollow:
+            transposed = transposed * (np.abs(rows - at[:, None]) > self._hollow // 2)[:, None]
         return _Part(rows, unit, np.linalg.solve(transposed @ basis, transposed))
 
     def _parts(self) -> Iterator[_Part]:
@@ -109,7 +112,8 @@ class Polynomials:
             shares = part.shares[:, :3] / units[:, :, None]
             result[:, begin:end] = np.swapaxes(shares @ values[part.rows], 0, 1)
             spread[:, begin:end] = np.linalg.norm(shares, axis=2).T
-        noise = np.sqrt(((values - result[0]) ** 2).mean(axis=0))
+        own = 1 + spread[0] ** 2 if self._hollow else np.ones(len(values))  # of values at samples that are left out
+        noise = np.sqrt(((values - result[0]) ** 2 / own[:, None]).mean(axis=0))
         return Fitted(result[0], result[1], result[2], spread[..., None] * noise)
 
 
