@@ -6,13 +6,14 @@ distributed (Baarda). A slip changes the offset of a cable from one sample on. C
 parameter for every cable and sample at once.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ...models import points
-from ..logs.measurements import ARRAYS
+from ..logs.measurements import ARRAYS, Measurements
 from ..pose.estimate import FALSE_ALARM_IN_LOG, largest_cost
 from ..pose.wrong_lengths import TOLD_APART
 from .fit import fit, held, settled
@@ -63,6 +64,13 @@ class Slip(NamedTuple):
     sample: int
     size: float
     sigma: float
+
+
+def wrong_shares(outliers: Sequence[Outlier], measurements: Measurements) -> np.ndarray:
+    """Return the share of the readings of each cable that are outliers, (m,); a rest counts once."""
+    wrong = np.zeros(measurements.lengths.shape, dtype=bool)
+    wrong[[one.sample for one in outliers], [one.cable for one in outliers]] = True
+    return np.asarray(wrong[of_motion(measurements)].mean(axis=0))
 
 
 def _threshold(count: int) -> float:

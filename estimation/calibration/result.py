@@ -22,11 +22,10 @@ from .file_errors import ENDS, offsets_are_open
 from .geometry import length_of
 from .load_changes import load_changes
 from .missing_pulleys import MissingPulleys, missing_pulleys
-from .outliers import Outlier, Slip
+from .outliers import Outlier, Slip, wrong_shares
 from .parameters import IN_BALANCE, Parameter, Parameters
 from .plausibility import Mistake
 from .repeating_errors import Repeating
-from .representative import of_motion
 from .solving import Noise, Solved, covariance_of, lengths_of
 
 EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
@@ -98,13 +97,10 @@ class CalibrationData(Displayed):
             return self.undetermined
         if self.residual_after > PLAUSIBLE * length_of(self.file):
             left = quantity(1e3 * self.residual_after, "mm", digits=3)
-            return (
-                f"no anchors and offsets explain the log: they leave residuals of {left}, so check clocks and sensors"
-            )
-        outliers, is_wrong = self._solved.outliers, np.zeros(self.residuals.shape, dtype=bool)
-        is_wrong[[one.sample for one in outliers], [one.cable for one in outliers]] = True
-        wrong = is_wrong[of_motion(self.measurements)].mean(axis=0)
-        for share, most, whose in ((wrong.mean(), MOST_WRONG, ""), (wrong.max(), 0.5, f" of cables[{wrong.argmax()}]")):
+            return f"no anchors and offsets explain the log: they leave residuals of {left}: check clocks and sensors"
+        wrong = wrong_shares(self._solved.outliers, self.measurements)
+        whole, of_one = wrong.mean(), wrong.max() if "anchors" in self.free else 0.0
+        for share, most, whose in ((whole, MOST_WRONG, ""), (of_one, 0.5, f" of cables[{wrong.argmax()}]")):
             if share > most:
                 return f"{100 * share:.0f} % of the readings{whose} do not fit the others: check clocks and sensors"
         if loads := load_changes(self._solved.model, self._solved.fit.state) if "mass" in self.free else []:
