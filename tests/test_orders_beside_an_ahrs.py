@@ -74,7 +74,7 @@ def test_the_order_of_a_symmetric_robot_is_never_sure(tmp_path):
     assert named >= 2
 
 
-@pytest.mark.parametrize("m", [6, 7, 8])
+@pytest.mark.parametrize("m", [6, 8])
 def test_the_order_of_more_cables_is_found_in_any_heading_and_in_left_handed_axes(m, tmp_path):
     robot, _, y, rotation, draw = a_log(tmp_path, m, 0)
     columns, heading = draw.permutation(m), draw.uniform(0.3, 3)
@@ -90,7 +90,7 @@ def test_the_order_of_more_cables_is_found_in_any_heading_and_in_left_handed_axe
     assert likely_order(robot, y, REFLECTION @ R @ REFLECTION, noise).columns.tolist() == list(range(m))
 
 
-@pytest.mark.parametrize("m", [6, 7, 8])
+@pytest.mark.parametrize("m", [6, 8])
 def test_a_heading_alone_is_corrected_and_none_is_seen_in_sound_logs(m, tmp_path):
     for seed in range(4):
         robot, true, y, rotation, draw = a_log(tmp_path, m, seed)
