@@ -24,11 +24,11 @@
 #include "control/observer.h"
 #include "control/usable.h"
 
-static const double UNSTABLE = 0.89;      /* of b (T + 2.4 C / T) */
-static const double SECOND = 2.4;         /* times C / T */
+static const double UNSTABLE = 0.89;         /* of b (T + 2.4 C / T) */
+static const double SECOND = 2.4;            /* times C / T */
 static const double LEAST = 1.3, MARGIN = 2; /* margin without which bandwidths are lowered, and until it is this */
-static const double SEEN = 0.3;           /* [m/s^2], of an oscillation that shows the lag */
-static const double COMPARED = 1.5;       /* over b, for an attitude loop and this one to be as fast */
+static const double SEEN = 0.3;              /* [m/s^2], of an oscillation that shows the lag */
+static const double COMPARED = 1.5;          /* over b, for an attitude loop and this one to be as fast */
 
 /* Return b, the bandwidth of a loop with three poles there that is damped as this one. */
 static double bandwidth_of(const towline_controller *controller) {
