@@ -24,7 +24,7 @@ typedef struct {
     double patience;  /* how long a cable may report no tension where one is commanded until it is taken for cut [s] */
     int32_t reacts;   /* 1: carriers leave their reference to help the tensions, */
     int32_t corrects; /* 1: also to correct errors */
-    int64_t lowers;       /* 1: bandwidths are lowered if the platform follows its commands too late, see step.c */
+    int64_t lowers;   /* 1: bandwidths are lowered if the platform follows its commands too late, see step.c */
     double carrier_bandwidth, carrier_acceleration; /* of that motion [rad/s], and at most [m/s^2, rad/s^2] */
     double reach[TOWLINE_MOST_CARRIERS][6];         /* how far each coordinate may go [m, rad] */
     double place;                                   /* bandwidth with which flying carriers keep their place [rad/s] */
