@@ -29,6 +29,7 @@ MOST_SAMPLES, MOST_FITTED, MOST_LIKELY, FEWEST = 40, 60, 3, 6
 CLEARLY = 3.0  # times smaller differences
 EXPLAINED = 0.75  # of the turns from a constant orientation, which differences in another convention must be below
 VISIBLE = np.radians(3.0)  # smaller ones are noise, or small offsets of the readings
+ASKEW = np.radians(4.0)  # smaller ones of a sensor may be due to displaced anchors, if these explain the log
 TILTED = np.radians(20.0)  # of a world whose vertical is another one
 MOUNTED = np.radians(7.0)  # from right angles, of a sensor on the platform
 LIKELIER = 0.95  # of the sum of squares that a fit with the orientations as they are leaves
@@ -52,7 +53,7 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Mistake | None:
     if not sure:
         return Mistake(f"{text}, by lengths at the measured orientations; another order fits as well", None)
     if not text and not turned:
-        return _in_frames(robot, given, rows, rotation, MOUNTED if explained else VISIBLE)
+        return _in_frames(robot, given, rows, rotation, ASKEW if explained else VISIBLE)
     text = " and ".join(filter(None, (text, _said("world", by) if turned else "")))
     placed = position, (by * Rotation.from_matrix(rotation)).as_matrix() if turned else rotation, given.carrier_poses
     corrected = corrected_to(given, placed, columns, 1.0)
