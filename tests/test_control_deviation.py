@@ -197,7 +197,7 @@ def test_predictions_are_compared_with_rare_states_and_between_failures_of_senso
     assert run.error[: run.lasted][silent].max() < 0.025
 
 
-@pytest.mark.parametrize(("period", "blind"), [(0.3, 0), (0.02, 1)])
+@pytest.mark.parametrize(("period", "blind"), [(0.3, 0), (0.03, 1)])
 def test_motions_that_are_not_compared_with_the_model_are_warned_of_once(period, blind):
     robot = load("cogiro")
     with pytest.warns(UserWarning, match="the motion was not compared with the model of Predictive for 0.") as warned:
